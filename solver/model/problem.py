@@ -241,15 +241,6 @@ class Problem(ByValue):
         return self.work_of_adhesion / self.strength
 
     @property
-    def opens_by_roughness(self) -> bool:
-        """Whether the strength is below E* h', twice the rms stress that flattens the profile.
-
-        Else adhesion at edges alone opens patches: the tension inside those of stiff contacts is
-        at most 0.7 of that (docs/zero-range.md).
-        """
-        return self.strength < self.half_space.modulus * math.sqrt(self.profile.m2)
-
-    @property
     def first_touch(self) -> float:
         """Separation in m at which a solid that approaches is attracted: h_max and the range."""
         return self.profile.h_max + self.attraction_range

@@ -47,7 +47,6 @@ from adhesis.solver.sharp.tolerances import (
     FIELD_SHARE,
     JUMP_RESOLUTION,
     LARGEST_FIELD_TOLERANCE,
-    LARGEST_WORK_OF_STEP,
     LATE_DROP,
     LEAST_DROP,
     LONGEST_GRIFFITH_CRACK,
@@ -58,7 +57,6 @@ from adhesis.solver.sharp.tolerances import (
     ROUNDING,
     TRAPEZOID,
     WEAKNESS_POWER,
-    WORK_OF_STEP,
 )
 
 
@@ -163,13 +161,6 @@ class SharpMethod(Method):
         if math.isfinite(problem.strength):
             touch = RANGE_RESOLVED * problem.attraction_range / profile.h_max
             tolerance = min(tolerance, max(touch, 0.5 * OVERLAP))
-        # Steps whose work is compared with the energy need an energy that is as exact.
-        work = math.inf
-        if problem.opens_by_roughness:
-            share = min(WORK_OF_STEP * weak**WEAKNESS_POWER, LARGEST_WORK_OF_STEP)
-            work = share * accuracy * problem.work_of_adhesion
-            exact = max(work / problem.full_contact_energy, ROUNDING)
-            tolerance = min(tolerance, exact)
         source = StressSource(profile, tolerance, problem.measure, problem.pattern)
         device = loading_device(problem)
         if adhesion is not None:
@@ -182,7 +173,6 @@ class SharpMethod(Method):
         self.resolution = Resolution(
             jump=max(JUMP_RESOLUTION * accuracy * (accuracy if load else 1.0), limit) * h_max,
             bend=float(TRAPEZOID * np.sqrt(min(1.0, accuracy / 1e-3)) * weak**WEAKNESS_POWER),
-            work=work,
             h_max=h_max,
             field_limit=limit * h_max,
             late=LATE_DROP * accuracy,

@@ -128,17 +128,6 @@ LATE_DROP = 0.5
 """Accuracy of the loss: a jump may be late by a work of this share of its drop."""
 LEAST_DROP = 2e-3
 """γ. Drops below this are taken as this when the lateness of a jump is judged."""
-WORK_OF_STEP = 8e-4
-"""Accuracy of the loss times γ, at strong adhesion: largest difference of the work and the change
-of energy over one step where roughness opens patches from inside. The loss is then a smaller part
-of the work than the rule of ``TRAPEZOID`` supposes, and between two folds the slopes at both ends
-hide the error. Steps of a loop err to the same side, so that a loop of steel with 2,000 steps needs
-this for an audit of 2e-5. With weak adhesion it falls as ``TRAPEZOID`` does."""
-LARGEST_WORK_OF_STEP = 2e-5
-"""Accuracy of the loss times γ: the largest value, however strong adhesion is."""
-WORK_STALLED = 0.5
-"""Share of the difference of work and energy over a step that a shorter one may leave at most, if
-it is an error of the step: half a step has a sixteenth of it, next to a fold a third."""
 TRAPEZOID = 1.5e-4
 """Largest relative error of the trapezoidal rule over one step at accuracy 1e-3."""
 WEAKNESS_POWER = 1.25

@@ -29,7 +29,7 @@ def test_a_branch_ends_in_its_fold_at_the_resolution_that_is_asked(resolution):
     point = edges.equilibrium(state.internal.gaps, 0.5 * h_max, edges.wave)
     finer = replace(method.resolution, jump=resolution * h_max, bend=np.inf)
     target = Target(3 * h_max, 3 * amplitude, "unloading")
-    branch, places = StableBranch(edges, finer, method.states, point, target), []
+    branch, places = StableBranch(edges, finer, point, target), []
     before = edges.count.newton_steps
     while not isinstance(event := branch.advance(), Fold):
         places.append(event.point.d)

@@ -14,12 +14,10 @@ from adhesis.solver._kernels import (
     Predictor,
     shortest_length,
 )
-from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.gap.ends import signs_of, without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics, PinnedEdges, Point, PreviousPoint
-from adhesis.solver.sharp.output.contact_states import States
 from adhesis.solver.sharp.tolerances import (
     LONGEST_STEP,
     ORDER_RESOLVED,
@@ -27,7 +25,6 @@ from adhesis.solver.sharp.tolerances import (
     PREDICTED_MOTION,
     QUIET_STRESS,
     TRAPEZOID_FAR,
-    WORK_STALLED,
 )
 
 
@@ -50,9 +47,6 @@ class Resolution:
         To which a jump is located, in d.
     bend : float
         Largest relative error of the trapezoidal rule over one step.
-    work : float
-        Largest difference in J/m² of the work and the change of energy over one step, where
-        roughness opens patches from inside; infinite where it does not.
     h_max : float
         q0 h_max.
     field_limit : float
@@ -67,7 +61,6 @@ class Resolution:
 
     jump: float
     bend: float
-    work: float
     h_max: float
     field_limit: float
     late: float
@@ -161,25 +154,21 @@ class StableBranch:
         self,
         edges: EdgeMechanics,
         resolution: Resolution,
-        states: States,
         point: Point,
         target: Target,
     ) -> None:
-        self._edges, self._resolution, self._states = edges, resolution, states
+        self._edges, self._resolution = edges, resolution
         self._target = target
         before = point.previous
         if before is not None and (point.d - before.d) * (target.d - point.d) < 0:
             point = point.with_previous(None)  # the path turns back
         self.point = self._output = point  # the last one whose state belongs to the path
         self._found = point.d  # of the last one that Newton's iteration has found
-        self._at_output: ContactState | None = None  # the state there, where work is compared
         self.trail = [point]
         self.smallest_step, self._longest = resolution.jump, math.inf  # step
         self._unrefined = 0.0  # smallest step before the fold ahead was located finely
         # straight where no point before is known: short steps there keep the integral exact
         self._predictor = beyond(point)
-        self._work_before = (0.0, math.inf)  # span and error of the step that was last judged
-        self._work_of_fields = 0.0  # largest difference that a shorter step did not reduce
         self._free_step, self._begins_to_move = 0.0, False  # with two works of adhesion
         self._two_folds: TwoFolds | None = None
         self._folds_apart = math.inf  # by the last prediction that saw two
@@ -192,7 +181,7 @@ class StableBranch:
             d = self._target.d if step == left else self.point.d + step
             reached = correct(self._edges, self._predictor, d)
             if reached is not None:
-                error = max(self._trapezoid_error(reached), self._work_error(reached))
+                error = self._trapezoid_error(reached)
                 share = 0.5 if error > TRAPEZOID_FAR else self._share_to_turn(reached, step)
                 if share == 1 or abs(step) <= 2 * self._resolution.field_limit:
                     return self._accept(reached, step, error)
@@ -281,9 +270,8 @@ class StableBranch:
         point = reached.with_previous(PreviousPoint(self.point.d, self.point.rate, self.point.gaps))
         self.trail.append(point)
         self.point, self._found = point, point.d
-        self._work_before = (0.0, math.inf)
         if is_output:
-            self._output, self._at_output = point, None
+            self._output = point
         if point.d != self._target.d:
             # what lies before a kink predicts nothing beyond it
             kink = self._begins_to_move
@@ -330,28 +318,6 @@ class StableBranch:
         if self._edges.adhesion.least < self._edges.adhesion.largest:
             change = max(change, *(abs(here - before - way * p.slope) for p in (output, point)))
         return float(change / 12 / (self._resolution.bend * scale))
-
-    def _work_error(self, point: Point) -> float:
-        """Difference of work and energy since the last output, in units of what is allowed.
-
-        A difference that a shorter step does not reduce is no error of the step: energies differ by
-        it where the number of modes of a gap changes. No smaller one halves a further step of the
-        branch.
-        """
-        if math.isinf(self._resolution.work):
-            return 0.0
-        span = abs(point.d - self._output.d)
-        if self._at_output is None:
-            self._at_output = self._states.of_point(self._output)
-        residual = self._states.energy_residual(self._at_output, self._states.of_point(point))
-        error = abs(residual) / self._resolution.work
-        if math.isnan(error):
-            return 0.0
-        longer, larger = self._work_before
-        self._work_before = span, error
-        if span < longer and error > WORK_STALLED * larger:
-            self._work_of_fields = max(error, self._work_of_fields)
-        return min(error, TRAPEZOID_FAR) if error <= self._work_of_fields else error
 
 
 def correct(edges: EdgeMechanics, predictor: Predictor, d: float) -> Point | None:

@@ -71,7 +71,7 @@ class Follower:
             point = point.with_previous(None) if turned is None else turned
             history.states.append(self.states.of_point(point))
         self._came_on = None
-        branch = StableBranch(self.edges, self.resolution, self.states, point, target)
+        branch = StableBranch(self.edges, self.resolution, point, target)
         while branch.point.d != target.d:
             event = branch.advance()
             if isinstance(event, Fold):

@@ -78,14 +78,12 @@ class RefinedTension:
 class InnerTension:
     """Local maxima of tension inside patches, for the fields of one problem.
 
-    They are searched on equally spaced nodes. A strength may be a small part of the stress that
-    flattens the profile: parabolas on eight nodes to a wave miss a maximum by 1e-2 of that stress,
-    on 32 by 4e-5.
+    They are searched on equally spaced nodes, eight or more to a shortest wave.
     """
 
     def __init__(self, problem: Problem) -> None:
-        profile, per_wave = problem.profile, 32 if problem.opens_by_roughness else 8
-        self._n = n = 1 << int(np.ceil(np.log2(per_wave * profile.highest_harmonic)))
+        profile = problem.profile
+        self._n = n = 1 << int(np.ceil(np.log2(8 * profile.highest_harmonic)))
         self._step = 2 * np.pi / n
         self._harmonic = harmonic = np.arange(n // 2 + 1)
         self._full = np.zeros(n // 2 + 1, dtype=np.complex128)  # S_full

@@ -161,13 +161,6 @@ class States:
         h_max = self.problem.profile.h_max
         return self.problem.control.conjugate(state.separation, state.mean_stress, h_max)
 
-    def energy_residual(self, before: ContactState, after: ContactState) -> float:
-        """Compute the change of energy between two states of a branch, less the work, in J/m²."""
-        way = self.problem.prescribed_in(after) - self.problem.prescribed_in(before)
-        work = 0.5 * way * (self._conjugate(before) + self._conjugate(after))
-        work -= way**2 * (after.tangent - before.tangent) / 12
-        return (after.potential - before.potential) / self.period + work
-
     def jump(
         self,
         before: ContactState,
