@@ -46,7 +46,7 @@ LOOP = {
     "runtime": (5, 4, SOLVER, "threads, signals\n(for all)"),
     "output": (1, 2, SHARP, "states and fields\nin SI units"),
     "continuation": (2, 2, SHARP, "predictor, steps,\nevents, jumps"),
-    "nucleation": (2, 1, SHARP, "first touch,\nfirst opening"),
+    "nucleation": (2, 1, SHARP, "first touch,\nseed patches"),
     "gap": (1, 0, SHARP, "ends of gaps,\nfull-contact stress"),
     "field": (2, 0, SHARP, "fields of given\nedges, openings"),
 }

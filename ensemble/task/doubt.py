@@ -40,7 +40,7 @@ def why_beyond(opens: bool) -> str:
             f"the tension inside patches exceeds the strength more than {limits.DOUBTFUL_EXCESS:g} "
             "times, where patches would open from inside, or the range of adhesion is longer than "
             f"touch_range, turn_range or {limits.EDGE_SHARE:.2g} of edge_range, so that what the "
-            "method sharp leaves out matters for it; take the method zones (docs/zero-range.md)"
+            "method 'sharp' leaves out matters for it; take the method 'zones' (docs/zero-range.md)"
         )
     return (
         f"{limits.ANY_RANGE} is below {limits.DOUBTFUL_RANGE:g} m, or the loss above "

@@ -353,8 +353,8 @@ def range_warnings(
             out.append(
                 f"the tension inside patches reaches {largest_tension:.3g} Pa, {excess:.3g} times "
                 f"the strength ({problem.strength:.3g} Pa): patches would open from inside there, "
-                "which the method sharp leaves out; take the method zones (--method zones, method "
-                '= "zones"; docs/zero-range.md)'
+                "which the method 'sharp' leaves out; take the method 'zones' (--method zones, "
+                'method = "zones"; docs/zero-range.md)'
             )
         own = gamma / problem.strength
         shares = {"edge_range": EDGE_SHARE, "touch_range": 1.0, "turn_range": 1.0}

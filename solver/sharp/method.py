@@ -73,10 +73,10 @@ def check_range(problem: Problem) -> None:
     least = math.sqrt(4 * modulus * gamma / (math.pi * most))
     raise ValueError(
         f"adhesion_range is {problem.attraction_range:g} m, strength {problem.strength:g} Pa: with "
-        f"the method sharp they must be at most {at_most(gamma / least, 3)} m and at least "
+        f"the method 'sharp' they must be at most {at_most(gamma / least, 3)} m and at least "
         f"{at_least(least, 3)} Pa for this profile, or Griffith's crack at the strength, "
         f"{crack:.3g} m long, exceeds a quarter of the shortest wave, and edges of zero range do "
-        'not describe it; the method zones takes any range (--method zones, method = "zones")'
+        "not describe it; the method 'zones' takes any range"
     )
 
 

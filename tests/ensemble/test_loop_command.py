@@ -89,8 +89,7 @@ def test_json_names_range_and_measure_and_what_zones_at_edges_change(
     share = 0.05 * (RANGE / data["edge_range"]) ** 4
     assert data["zone_error"] == pytest.approx(share * data["loss"], rel=1e-9)
     assert (data["stripes"], data["stripe_amplitude"], data["stripe_phase"]) == (None,) * 3
-    assert (data["openings"], data["barrier"]) == (0, 0.0)
-    assert {jump["barrier"] for jump in data["jumps"]} == {0.0}
+    assert data["openings"] == 0
     assert data["measure"] == ("flat" if "flat" in words else "arc")
     assert (", flat measure, " in text) == ("flat" in words)
 
@@ -144,7 +143,7 @@ DIMENSIONAL = {
     "J/m": {"energy", "elastic_energy", "adhesion_energy"},
     "J/m²": {
         *("work_of_adhesion", "loss", "loss_from_drops", "loss_error", "energy_drop", "at_stake"),
-        *("energy_at_stake", "barrier", "work_gained", "work_spent", "full_contact_energy"),
+        *("energy_at_stake", "work_gained", "work_spent", "full_contact_energy"),
         *("effective_work_of_approach", "effective_work_of_separation"),
         *("work_of_adhesion_open", "least_work_of_adhesion", "friction", "zone_error"),
     },

@@ -99,7 +99,7 @@ def test_a_loss_is_doubted_by_the_work_of_adhesion_that_it_spends():
     """Twenty times the work of adhesion of the largest contact bound it, that of opening."""
     values = {
         "valid_range": 1.0, "loss": 1.0, "work_of_adhesion": 0.04, "largest_contact_fraction": 0.5,
-        "opening_strength": np.inf, "barrier": 0.0, "edge_range": 1.0, "touch_range": 1.0,
+        "opening_strength": np.inf, "edge_range": 1.0, "touch_range": 1.0,
         "turn_range": np.inf,
     }  # fmt: skip
     assert beyond_zero_range(values | {"gamma_open": 0.04})

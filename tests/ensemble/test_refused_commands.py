@@ -103,7 +103,7 @@ LOOP --path=-0.5,out -> it must start with loading
 LOOP --path=out -> --path is 'out': it holds no turning point
 LOOP --path=0.5,x,out -> --path is '0.5,x,out': it must be numbers with commas
 LOOP --path=0.5,nan -> --path[1] is nan
-{{LOOP,TRACE --plan --unit um}} --adhesion-range 0.3 -> --adhesion-range is 0.3 m: it must be at
+{{LOOP,TRACE --plan --unit um}} --adhesion-range 0.3 -> --adhesion-range is 0.3 m, strength
 LOOP --path=0.5 --max-penetration 0.5 -> are given: give one of them
 LOOP --path 0,5,0,2,out -> --path is '0,5,0,2,out': numbers have a decimal point, as in
 LOOP --max-penetration 90% -> --max-penetration is '90%': it must be one or more numbers between

@@ -317,9 +317,8 @@ Problem(WAVE, SOLID, 0.3, measure='projected') ->
     ValueError: measure is 'projected': it must be one of arc, flat
 Problem(WAVE, SOLID, 0.04, adhesion_range=1e-09, strength=1000000.0) ->
     ValueError: adhesion_range is 1e-09 and strength is
-Problem(WAVE, SOLID, 0.04, strength=1000.0) -> ValueError: strength is 1000 Pa: it must be at least
-Problem(WAVE, SOLID, 0.04, adhesion_range=0.001) ->
-    ValueError: adhesion_range is 0.001 m: it must be at most
+make_method('sharp', Problem(WAVE, SOLID, 0.04, strength=1000.0)) ->
+    ValueError: adhesion_range is 4e-05 m, strength 1000 Pa: with the method 'sharp' they
 Problem(WAVE, SOLID, 0.0, work_of_adhesion_open=0.1) ->
     ValueError: it must be left out, as γ is 0
 Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0, strength=1000000.0) ->
@@ -593,10 +592,10 @@ def test_a_bound_that_a_refusal_names_is_taken(seed: int) -> None:
         assert found
         return [float(number) for number in found.groups()]
 
-    (strength,) = named(r"at least (\S+) Pa for", lambda: problem(strength=10.0))
-    (longest,) = named(r"at most (\S+) m for", lambda: problem(adhesion_range=1e-3))
-    problem(strength=strength)
-    problem(adhesion_range=longest)
+    call = partial(make_method, "sharp", problem(strength=10.0))
+    longest, least = named(r"at most (\S+) m and at least (\S+) Pa for", call)
+    make_method("sharp", problem(strength=least))
+    make_method("sharp", problem(adhesion_range=longest))
     for name in ("sharp", "grid"):
         call = partial(make_method, name, problem(1e29))
         for gamma in named(r"from (\S+) to (\S+) J", call):

@@ -1,6 +1,7 @@
 """Adhesion of a finite range: loops of ``sharp`` against closed forms and other solutions."""
 
 import re
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 from adhesis import Control, HalfSpace, LoopResult, Problem, make_method, run_path, single_wave
+from adhesis.solver.loading.zero_range import beyond_limit, range_warnings
 from adhesis.solver.model.profile import Array
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.continuation.jump import Jumps
@@ -195,6 +197,37 @@ def test_a_touch_that_does_not_hold_is_tried_again_from_nearer_by(monkeypatch):
     assert 0.003 < max(later) / 2e-8 < 0.02
     assert sum(abs(way) > 1e-4 * 2e-8 for way in later) == 1
     assert abs(loop.loss - reference.loss) < min(1e-3 * reference.loss, loop.loss_error)
+
+
+def test_tension_above_the_strength_inside_patches_makes_a_loss_doubtful():
+    """Patches would open there, which is left out: such a loss is that of closed valleys."""
+    problem = Problem(scenes.rough(2, 8, 0), HalfSpace(1e9, 0.5), GAMMA, strength=4e6)
+    loop = scenes.loop_of(problem, max_penetration=0.9, load_steps=20)
+    assert loop.largest_interior_tension > 1.2 * 4e6
+    assert loop.openings == 0
+    (excess,) = (text for text in loop.warnings if "inside patches" in text)
+    assert "times the strength (4e+06 Pa): patches would open from inside there" in excess
+    assert "take the method 'zones' (--method zones" in excess
+    assert range_warnings(problem, GAMMA / (1.005 * 4e6), 1.0, [0.5]) == []
+    assert len(range_warnings(problem, GAMMA / (1.02 * 4e6), 1.0, [0.5])) == 1
+    # the last has zero range, one an unknown strength
+    wrong = beyond_limit(
+        0.02 / (1e9 * np.array([1.005, 1.02, 0.5, 1.02, 1e3])),
+        *([1.0] * 5, 0.02, 0.5),
+        [1e9, 1e9, 1e9, np.nan, np.inf],
+        0.02 / (1e9 * 0.5),
+    )
+    assert wrong.tolist() == [False, True, False, False, True]
+
+
+def test_a_range_is_a_strength_and_a_short_one_changes_nothing():
+    zero, short = rough_loop(None), rough_loop(1e-15)
+    assert short.problem.strength == GAMMA / 1e-15
+    assert short.problem == replace(zero.problem, strength=GAMMA / 1e-15)
+    assert replace(short.problem, work_of_adhesion=0.02).strength == short.problem.strength
+    assert replace(zero.problem, work_of_adhesion=0.0, strength=1e6).strength == np.inf
+    assert [jump.kind for jump in short.jumps] == [jump.kind for jump in zero.jumps]
+    assert abs(short.loss - zero.loss) < short.loss_error + zero.loss_error
 
 
 def test_a_minor_loop_inside_the_range_closes():

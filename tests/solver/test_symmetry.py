@@ -12,12 +12,11 @@ from tests.support.scenes import HALF_SPACE as SOFT
 from tests.support.scenes import UNEVEN, grid_of, loop_of, loops_at, rough
 
 SHIFT = np.exp(1e-7j)
-DEEP, DEEPER = {"max_penetration": 0.7}, {"max_penetration": 0.9}
+DEEP = {"max_penetration": 0.7}
 # Problem, turning point, and how near the losses are: by the accuracy with which jumps are found.
 SCENES: dict[str, tuple[Problem, dict[str, float], float]] = {
     "stiff": (Problem(rough(2, 8, 0), HalfSpace(1e8, 0.5), 0.04), DEEP, 1e-3),
     "range": (Problem(rough(3, 3, 1), HalfSpace(1e8, 0.5), 0.04, strength=2e6), DEEP, 1e-4),
-    "opens": (Problem(rough(2, 4, 0), HalfSpace(1e9, 0.5), 0.04, strength=4e6), DEEPER, 1e-3),
     "separation": (Problem(rough(3, 8, 4), SOFT, 0.01), DEEP, 1e-5),
     "stiffness": (Problem(rough(3, 8, 4), SOFT, 0.01, Control(1e10)), DEEP, 1e-5),
     "load": (Problem(rough(3, 8, 4), SOFT, 0.01, Control(0.0)), {"max_stress": 500.0}, 1e-5),
@@ -48,7 +47,6 @@ def test_mirror_shift_and_scale_change_nothing(name):
     there = loop_of(other, **path, **{k: scale * v for k, v in turn.items()})
     assert [jump.kind for jump in there.jumps] == [jump.kind for jump in here.jumps]
     assert len(here.jumps) > 2
-    assert (here.openings > 0) == (name == "opens")
     scale = stresses if "max_stress" in turn else 1.0
     assert there.turning_point == pytest.approx(scale * here.turning_point, rel=1e-6)
     for value in ("loss", "friction"):

@@ -17,7 +17,7 @@ from tests.support.exact_wave import ExactWave
 WAVE_CLAIMS = tuple(
     claim
     for claim in validation.CLAIMS
-    if claim.__name__ not in ("order", "full_contact", "opening", "audit")  # not one wave or grid
+    if claim.__name__ not in ("order", "full_contact", "audit")  # not one wave or grid
 )
 WITHOUT_CONTROLS = tuple(claim for claim in WAVE_CLAIMS if claim is not validation.controls)
 
@@ -53,11 +53,6 @@ def test_the_exact_method_keeps_every_bound_of_the_wave(judged):
     parabola = [row for claim, row in rows.items() if "parabola" in claim]
     assert parabola
     assert all(row.error > 0.5 * row.bound for row in parabola)
-
-
-def test_a_grid_has_no_claim_about_a_strength(monkeypatch):
-    monkeypatch.setattr(validation, "CLAIMS", (validation.opening,))
-    assert validate(("grid",)) == []  # it refuses a range of adhesion
 
 
 def wrong(change: Callable[[ExactWave, ContactState], dict[str, float]]) -> type[ExactWave]:

@@ -96,7 +96,7 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         "unloading_energy": np.where(stuck, -2e-6, 0.0),
         "jump_count": rng.integers(1, slots + 1, n).astype(np.int32),
     }
-    none = ("rank", "friction", "zone_error", "openings", "barrier")
+    none = ("rank", "friction", "zone_error", "openings")
     out |= {name: np.zeros(n) for name in none}
     out |= {name: np.full(n, np.inf) for name in ("turn_range", "opening_strength")}
     used = np.arange(slots) < out["jump_count"][:, None]
