@@ -185,8 +185,6 @@ class Equilibrium:
     @property
     def pinned_rate(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
-    def solve_field(self, prescribed: float, model: FieldModel) -> Field: ...
-
 class DescentEvent(enum.Enum):
     AT_REST = 0
 

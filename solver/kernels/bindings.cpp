@@ -280,14 +280,13 @@ void bind_field(nb::module_& m) {
       .def(
           "by_prescribed",
           [](const Field& f) {
-            if (f.solved[1].empty())
-              throw std::invalid_argument("solved in a known potential: it has no derivatives");
+            if (std::isnan(f.pressure)) throw std::invalid_argument("there is no field");
             const double rate = -2 * pi / f.resistance;
             Vector out = edge_openings(f.solved[1], f.nodes, f.equations, false);
             for (double& opening : out) opening *= -rate;
             return std::tuple(rate, -f.unit_mean * rate / (2 * pi), out);
           },
-          "Differentiate p, q0 s and C by d at fixed edges; ValueError if the potential was known.")
+          "Differentiate p, q0 s and C by d at fixed edges; ValueError if there is no field.")
       .def(
           "fine_opening",
           [](const Field& f, int k, double per_wave) {
@@ -340,14 +339,7 @@ void bind_response(nb::module_& m) {
       .def_prop_ro("separation", [](const Equilibrium& e) { return e.at.separation; })
       .def_prop_ro("slope", [](const Equilibrium& e) { return e.at.slope; })
       .def_ro("pinned_share", &Equilibrium::pinned_share)
-      .def_ro("pinned_rate", &Equilibrium::pinned_rate)
-      .def(
-          "solve_field",
-          [](const Equilibrium& e, double prescribed, const FieldModel& model) {
-            return solve_separately(e.ends, e.references, e.orders, e.potential, e.at.pressure,
-                                    prescribed, model);
-          },
-          "prescribed"_a, "model"_a, Unlocked());
+      .def_ro("pinned_rate", &Equilibrium::pinned_rate);
   nb::enum_<DescentEvent>(m, "DescentEvent")
       .value("AT_REST", DescentEvent::at_rest)
       .value("VANISHED", DescentEvent::vanished)

@@ -15,6 +15,23 @@ bool place_gap(LinearResponse& response, int k) {
   return invert_definite(&response.equations.blocks[square], m, &response.inverse[square]);
 }
 
+// Interpolate a potential g at θ from G = g dθ/dη at the nodes of a gap; beyond an end of the gap
+// it is the potential at that end.
+double interpolate_potential(const Gap& gap, const GaussRule& rule, const double* potential,
+                             double theta) {
+  MappedPoint at = eta_at(gap, std::min(std::max(theta, gap.end[0]), gap.end[1]));
+  double above = 0, below = 0, sign = 1;
+  for (int i = 0; i < rule.count; ++i) {
+    double apart = at.eta - rule.eta[i];
+    if (apart == 0) return at.slope * potential[i];
+    double share = sign * rule.weights[i] / apart;
+    above += share * potential[i];
+    below += share;
+    sign = -sign;
+  }
+  return at.slope * above / below;
+}
+
 // Move the reference of a gap, placed already, with the potential there; `old` is where it was,
 // with nodes of `old_rule`.
 void renew_gap(LinearResponse& response, int k, const Gap& old, const GaussRule& old_rule,
@@ -274,10 +291,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
     if (out.corrections >= MOST_CORRECTIONS) break;
     last = size;
   }
-  out.potential = response.potentials_at(pressure);
   response.is_lost = !out.found;
-  out.references = response.nodes.gaps;
-  out.orders = response.nodes.orders;
   out.ends = ends;
   if (out.found && law.pins()) share_openings(out, response, states.held, law, model);
   return out;
