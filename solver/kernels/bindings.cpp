@@ -169,10 +169,10 @@ using PythonAdhesionState = std::tuple<bool, double, double, WorkFunction, Integ
 void bind_model(nb::module_& m) {
   nb::class_<Panels>(m, "Panels")
       .def(nb::init<double, int, Vector, Vector, Vector, Vector, Vector, Vector, Pair, Pair,
-                    Integers, Vector, Vector, int, Vector, Vector, Vector, int>(),
+                    Integers, Vector, Vector, Vector, Vector, Vector, int>(),
            nb::kw_only(), "width"_a, "finest_count"_a, "x"_a, "w"_a, "stress"_a, "slope"_a,
            "tilt"_a, "pattern"_a, "half_plane"_a, "weights"_a, "level_start"_a, "end_x"_a,
-           "end_w"_a, "short_count"_a, "length_x"_a, "length_w"_a, "length_before"_a,
+           "end_w"_a, "length_x"_a, "length_w"_a, "length_before"_a,
            "highest_harmonic"_a)
       .def(
           "stress",

@@ -121,7 +121,7 @@ bool move_references(LinearResponse& response, const Vector& ends, const EdgeSta
     if (far[e / 2]) both.held[e] = true;
   hold_edges(response, ends, both);
   for (int k = 0; k < count; ++k)
-    if (changed[k] && has_room) fill_gap(k, 2, nodes, response.equations, model);
+    if (changed[k] && has_room) fill_gap(k, nodes, response.equations, model);
   bool renewed = has_room;
   for (int k = 0; k < count; ++k) {
     if (!(changed[k] && renewed)) continue;
@@ -179,7 +179,7 @@ std::optional<LinearResponse> set_up_response(const Vector& ends, double prescri
   LinearResponse out(Nodes(gaps, std::move(orders), ROOM), model.digits);
   const int count = out.gap_count();
   for (int k = 0; k < count; ++k) {
-    fill_gap(k, 2, out.nodes, out.equations, model);
+    fill_gap(k, out.nodes, out.equations, model);
     if (!place_gap(out, k)) return std::nullopt;
   }
   for (int run = count; run < out.tree.run_count(); ++run) out.tree.place_charges(run);

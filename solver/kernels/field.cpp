@@ -76,7 +76,7 @@ Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
   const int n = nodes.size();
   const Unset inverse = unset(nodes.square.back());
   for (int k = 0; k < count; ++k) {
-    fill_gap(k, 1, field.nodes, field.equations, model);
+    fill_gap(k, field.nodes, field.equations, model);
     const int at = nodes.square[k];
     if (!invert_definite(&field.equations.blocks[at], nodes.size_of(k), &inverse[at])) return field;
   }
