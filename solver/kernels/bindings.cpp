@@ -432,9 +432,9 @@ void bind_nucleation(nb::module_& m) {
 }
 
 void bind_predictor(nb::module_& m) {
-  nb::class_<FoldAhead>(m, "FoldAhead")
-      .def_ro("edge", &FoldAhead::edge)
-      .def_ro("distance", &FoldAhead::distance);
+  nb::class_<LeadingEdge>(m, "LeadingEdge")
+      .def_ro("edge", &LeadingEdge::edge)
+      .def_ro("fold_distance", &LeadingEdge::fold_distance);
   nb::class_<Predictor>(m, "Predictor")
       .def(nb::init<double, Vector, Vector, std::optional<std::tuple<double, Vector, Vector>>>(),
            "d"_a, "gaps"_a, "rate"_a, "before"_a.none(),
@@ -444,8 +444,8 @@ void bind_predictor(nb::module_& m) {
           "gaps", [](const Predictor& p) { return pairs_of(p.ends); }, new_array)
       .def_prop_ro("rate", [](const Predictor& p) { return p.rate; })
       .def_ro("way", &Predictor::way)
-      .def_ro("fold", &Predictor::fold)
-      .def("other_fold", &Predictor::other_fold)
+      .def_ro("leading", &Predictor::leading)
+      .def("other_leading", &Predictor::other_leading)
       .def(
           "predict_gaps",
           [](const Predictor& p, double at) { return pairs_of(p.predict_ends(at)); }, "at"_a)
