@@ -292,7 +292,7 @@ void bind_field(nb::module_& m) {
           [](const Field& f, int k, double per_wave) {
             if (std::isnan(f.pressure)) throw std::invalid_argument("there is no field");
             const int count = count_sine_nodes(f, k, per_wave);
-            return rising(open_gap(f, k, Circle(count + 1)));
+            return rising(open_gap(f, k, *circle_of(count + 1)));
           },
           "k"_a, "per_wave"_a, Unlocked(),
           "Evaluate θ, T and the weight of ∫ T g dθ over T of a gap at fine nodes, and b_n.\n\n"
