@@ -190,9 +190,7 @@ class DescentEvent(enum.Enum):
 
     VANISHED = 1
 
-    STEP_LIMIT = 2
-
-    NO_FIELD = 3
+    NO_FIELD = 2
 
 class Descent:
     @property

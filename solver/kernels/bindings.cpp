@@ -172,8 +172,7 @@ void bind_model(nb::module_& m) {
                     Integers, Vector, Vector, Vector, Vector, Vector, int>(),
            nb::kw_only(), "width"_a, "finest_count"_a, "x"_a, "w"_a, "stress"_a, "slope"_a,
            "tilt"_a, "pattern"_a, "half_plane"_a, "weights"_a, "level_start"_a, "end_x"_a,
-           "end_w"_a, "length_x"_a, "length_w"_a, "length_before"_a,
-           "highest_harmonic"_a)
+           "end_w"_a, "length_x"_a, "length_w"_a, "length_before"_a, "highest_harmonic"_a)
       .def(
           "stress",
           [](const Panels& p, const Vector& theta) {
@@ -343,7 +342,6 @@ void bind_response(nb::module_& m) {
   nb::enum_<DescentEvent>(m, "DescentEvent")
       .value("AT_REST", DescentEvent::at_rest)
       .value("VANISHED", DescentEvent::vanished)
-      .value("STEP_LIMIT", DescentEvent::step_limit)
       .value("NO_FIELD", DescentEvent::no_field);
   nb::class_<Descent>(m, "Descent")
       .def_ro("event", &Descent::event)
