@@ -254,7 +254,7 @@ class SharpMethod(Method):
                     "without adhesion the method 'sharp' finds no first patches under a load, or "
                     "where a soft stiffness holds the solid; the method 'grid' does"
                 )
-            event = Event(self.states.detached(touch), d, gaps, start)
+            event = Event(self.detached(touch / self.q0), d, gaps, start)
             point = history.commit(self.jumps.compute(event, target.direction))
         else:
             gaps = state.internal.gaps

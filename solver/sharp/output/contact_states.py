@@ -9,7 +9,7 @@ import numpy as np
 
 from adhesis.solver._kernels import LoadingDevice, SearchedGaps
 from adhesis.solver.method import ContactState
-from adhesis.solver.model.jump import Branch, Jump
+from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.gap.ends import union_of
@@ -76,10 +76,6 @@ class States:
     def prescribed_of(self, state: ContactState) -> float:
         """Return the prescribed value of a state in field units, d."""
         return self.to_field_units(self.problem.prescribed_in(state))
-
-    def detached(self, separation: float) -> ContactState:
-        """Make the state without contact at q0 s = ``separation``."""
-        return ContactState.detached(separation / self.q0)
 
     def attracts_when_detached(self, d: float, touch: float | None = None) -> bool:
         """Return whether a state without contact at ``d`` would lie below q0 s = ``touch``.
@@ -166,22 +162,3 @@ class States:
         work = 0.5 * way * (self._conjugate(before) + self._conjugate(after))
         work -= way**2 * (after.tangent - before.tangent) / 12
         return (after.potential - before.potential) / self.period + work
-
-    def jump(
-        self,
-        before: ContactState,
-        after: ContactState,
-        direction: Branch,
-        at_stake: float | None = None,
-        barrier: float = 0.0,
-    ) -> Jump:
-        """Make the jump between two states; ``at_stake`` in J/m² if it raced, else None.
-
-        ``barrier`` is that of an opening, in units of γ/q0.
-        """
-        barrier *= self.problem.work_of_adhesion / (self.q0 * self.period)
-        return Jump.between(
-            before, after, direction, self.period, raced=at_stake is not None,
-            at_stake=at_stake or 0.0, barrier=barrier,
-            falls_off=self.problem.control.is_load and not after.patches,
-        )  # fmt: skip
