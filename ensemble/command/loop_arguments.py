@@ -11,9 +11,9 @@ import argparse
 import math
 from pathlib import Path
 
+from adhesis.ensemble.command import trace_arguments
 from adhesis.ensemble.command.parser import declare
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, STRESS, WORK_OF_ADHESION
-from adhesis.ensemble.trace import trace_arguments
 
 # The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
 PERIOD, N0, RATIO, H_RMS = 2e-3 * math.pi, 10, 100, 1e-6

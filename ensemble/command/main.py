@@ -44,8 +44,8 @@ COMMANDS: dict[str, str] = {
 }
 EXAMPLES = ("adhesis loop --hurst 0.8 --seed 1", "adhesis run jobs/example.toml --ranks 3")
 _WITHOUT_NUMERICS = ("new", "completion")
-# Modules that declare options without loading the solver; those of other commands do so themselves.
-_OPTIONS = {"loop": "command.loop_arguments", "trace": "trace.trace_arguments"}
+# Their options are declared in modules of their own, without loading the solver.
+_OPTIONS = ("loop", "trace")
 # What several processes of a launcher do with a command: the ranks of `run` share its work, and
 # these are independent of one another (of other profiles, on other nodes). Rank 0 alone runs the
 # rest.
@@ -103,7 +103,8 @@ def _write_no_byte_code_under_a_limit() -> None:
 
 def parser_of(name: str) -> Parser:
     """Return the parser of a command."""
-    module = importlib.import_module(f"adhesis.ensemble.{_OPTIONS.get(name, f'command.{name}')}")
+    suffix = "_arguments" if name in _OPTIONS else ""
+    module = importlib.import_module(f"adhesis.ensemble.command.{name}{suffix}")
     parser = Parser(f"adhesis {name}", module.__doc__ or "", module.EXAMPLES)
     module.add_arguments(parser)
     return parser
