@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
+from adhesis.ensemble.command import options
 from adhesis.ensemble.command.loop_arguments import H_RMS, N0, PERIOD, RATIO
+from adhesis.ensemble.command.options import Cycle, cycle_of, in_options
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 from adhesis.ensemble.loop import record
-from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
 from adhesis.ensemble.loop.heights import heights_warning, read_heights
 from adhesis.ensemble.outputs import Writing, check_ending, check_outputs, whole_file, write_json
-from adhesis.ensemble.trace import options
 from adhesis.ensemble.versions import input_record, provenance
 from adhesis.solver import checks
 from adhesis.solver.checks import plain

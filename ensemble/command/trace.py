@@ -5,9 +5,16 @@ from __future__ import annotations
 import argparse
 import sys
 
+from adhesis.ensemble.command.options import (
+    control_of,
+    in_options,
+    pattern_of,
+    prepared_of,
+    turns_of,
+    what_was_read,
+)
 from adhesis.ensemble.errors import InputError, refused_as_input
 from adhesis.ensemble.exit_codes import SOME_FAILED
-from adhesis.ensemble.loop.cycle import control_of, in_options, turns_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
 from adhesis.ensemble.quantities import WORK_OF_ADHESION, read_list
 from adhesis.ensemble.trace.answer import (
@@ -19,7 +26,6 @@ from adhesis.ensemble.trace.answer import (
     make_cycle,
     run_plan,
 )
-from adhesis.ensemble.trace.options import pattern_of, prepared_of, what_was_read
 from adhesis.ensemble.trace.variants import make_plan
 from adhesis.ensemble.versions import input_record, provenance
 from adhesis.solver.model.half_space import HalfSpace

@@ -19,8 +19,7 @@ from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import length_text, with_error
 from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.run.dispatch import Unresponsive
-from adhesis.ensemble.trace.loops import Cycle, Loops, Result, Run, Watch
-from adhesis.ensemble.trace.options import MAX_PENETRATION
+from adhesis.ensemble.trace.loops import MAX_PENETRATION, Cycle, Loops, Result, Run, Watch
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import TABLES, Plan, make_plan
 from adhesis.solver import checks

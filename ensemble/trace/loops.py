@@ -27,6 +27,8 @@ from adhesis.solver.registry import MethodName, make_method
 Result = dict[str, Any]
 Watch = Callable[["Loops"], None]
 
+MAX_PENETRATION = 0.9
+"""Turning point Δ/h_max where none is given."""
 _REPORT_INTERVAL = 1.0  # s
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import parser_of
+from adhesis.ensemble.command.options import turns_of
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.loop.cycle import turns_of
 from adhesis.ensemble.quantities import (
     HEIGHT,
     LENGTH,

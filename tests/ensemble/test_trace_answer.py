@@ -20,6 +20,7 @@ from matplotlib.image import imread
 
 from adhesis import Control, self_affine_profile, stripes
 from adhesis.ensemble.command.main import main
+from adhesis.ensemble.command.options import what_was_read
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.trace import answer as answers
 from adhesis.ensemble.trace.answer import (
@@ -33,7 +34,6 @@ from adhesis.ensemble.trace.answer import (
 from adhesis.ensemble.trace.answer import document as document_of
 from adhesis.ensemble.trace.figures import _tables as tables_of
 from adhesis.ensemble.trace.loops import Loops
-from adhesis.ensemble.trace.options import what_was_read
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 from adhesis.ensemble.trace.trace_page import page_text, summary
@@ -422,7 +422,7 @@ def test_a_crest_that_carries_all_contact_is_warned_of_and_left_out_once(tmp_pat
 
 
 def test_the_command_plans_with_ranges_left_out_and_writes_nothing(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("adhesis.ensemble.trace.options._LARGE", 0)
+    monkeypatch.setattr("adhesis.ensemble.command.options._LARGE", 0)
     monkeypatch.setattr("adhesis.ensemble.reporter.interval", lambda elapsed: 1e-3)
     path = tmp_path / "t.txt"
     rows = [f"{1e6 * a:.3f};{1e6 * z:.6f}" for a, z in zip(X, PROFILE.at(X), strict=True)]
