@@ -16,8 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.markers import CARETDOWN
 
-from adhesis.ensemble.aggregate.average import aggregate
-from adhesis.ensemble.aggregate.by_blocks import BIN_EDGES, BINS_PER_DECADE
+from adhesis.ensemble.aggregate.average import BIN_EDGES, BINS_PER_DECADE, aggregate
 from adhesis.ensemble.aggregate.companions import differing_keys, kind_of
 from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign

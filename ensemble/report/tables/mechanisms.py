@@ -7,8 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
-from adhesis.ensemble.aggregate.by_blocks import SMALL, fitted_slope
+from adhesis.ensemble.aggregate.average import SMALL, Aggregate, AveragedCell, fitted_slope
 from adhesis.ensemble.quantities import percent
 from adhesis.ensemble.report.further_axes import state_sign
 from adhesis.ensemble.report.tables.key import estimated, key_columns
