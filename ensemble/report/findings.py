@@ -25,7 +25,7 @@ from adhesis.ensemble.report.further_axes import (
     state_sign,
     together,
 )
-from adhesis.ensemble.report.tables.loss_tables import extreme, inside_interval, off_the_paper
+from adhesis.ensemble.report.tables.campaign_tables import extreme, inside_interval, off_the_paper
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.doubt import (
     INSTEAD,

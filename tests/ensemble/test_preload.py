@@ -16,7 +16,7 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.figures.catalogue import sections
 from adhesis.ensemble.report.markdown_page import write_page
-from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
+from adhesis.ensemble.report.tables import campaign_tables
 from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.ensemble.trace import answer as answers
 from adhesis.ensemble.trace.loops import Cycle, Loops, Run
@@ -336,7 +336,7 @@ def test_a_campaign_under_a_weight_says_so_and_its_shares_are_of_the_drops_befor
     outcome = findings.verdict(data)[0]
     assert "under a weight, which falls off at " in outcome
     assert "(the loop is closed at the separation of the fall)" in outcome
-    table = mechanism_tables.jumps(data)
+    table = campaign_tables.jumps(data)
     share = table.columns.index(next(c for c in table.columns if c.name == "share_of_drops"))
     shares = [row[share] for row in table.rows]
     assert min(shares) >= 0

@@ -19,7 +19,7 @@ from adhesis.ensemble.report import findings, paper
 from adhesis.ensemble.report.figures.catalogue import sections
 from adhesis.ensemble.report.figures.style import style
 from adhesis.ensemble.report.further_axes import shown_cells
-from adhesis.ensemble.report.tables.loss_tables import losses, works
+from adhesis.ensemble.report.tables.campaign_tables import losses, works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.schema import FAILED
