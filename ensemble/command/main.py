@@ -105,9 +105,7 @@ def parser_of(name: str) -> Parser:
     """Return the parser of a command."""
     suffix = "_arguments" if name in _OPTIONS else ""
     module = importlib.import_module(f"adhesis.ensemble.command.{name}{suffix}")
-    parser = Parser(f"adhesis {name}", module.__doc__ or "", module.EXAMPLES)
-    module.add_arguments(parser)
-    return parser
+    return Parser(f"adhesis {name}", module.__doc__ or "", module.EXAMPLES, module.OPTIONS)
 
 
 def _execute(name: str, words: Sequence[str]) -> int:

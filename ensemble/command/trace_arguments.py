@@ -7,120 +7,95 @@ Lengths are in m and stresses in Pa, unless they carry a unit (5um, 20kPa).
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
-from adhesis.ensemble.command.parser import declare
 from adhesis.ensemble.quantities import LENGTH, STIFFNESS, STRESS, WORK_OF_ADHESION
 
 EXAMPLES = (
     "adhesis trace trace.csv --unit um --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out",
     "adhesis trace trace.csv --work-of-adhesion 0.02,0.04 --young 1e6 --poisson 0.5 --plan",
 )
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of ``adhesis trace``."""
-    required = {"required": True}
-    gamma = (
-        "in J/m², or 20mJ/m2; of several (0.04,0.02,0.08) the first is the answer's, the "
-        "others make a table, as of several turning points"
-    )
-    declare(parser, ("file FILE", Path, "text or instrument's file"))
-    contact = parser.add_argument_group("contact and cycle")
-    declare(
-        contact,
-        ("--work-of-adhesion G", None, gamma, required),
-        ("--young E", STRESS.option, "in Pa, or 1MPa", required),
-        ("--poisson NU", float, "0.5: incompressible", required),
-    )
-    add_cycle_arguments(contact)
-    add_method_arguments(contact, "of each loop (default 1e-3)")
-    add_reading_arguments(parser)
-    declare(
-        parser.add_argument_group("output"),
-        ("--to DIR", Path, "for the page, its figures and JSON"),
-        ("--plan", bool, "print the plan, and stop"),
-        ("--quick", bool, "without tables of γ and turning point"),
-        ("--processes N", int, "side by side (default: cores)"),
-        ("--quiet", bool, "no progress on stderr"),
-    )
-
-
-def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
-    """Declare laws of adhesion, turning points and control, which ``adhesis loop`` shares."""
-    opened = (
-        "where an edge recedes, at least that where it advances, --work-of-adhesion; between "
-        "both it is pinned (default: the same)"
-    )
-    stripes = "the work of adhesion varies N times along the period, about --work-of-adhesion"
-    measure = "adhesion acts on the length of the profile (arc, default) or its projection (flat)"
-    reach = (
-        "range of adhesion, 0.3nm; surfaces touch at a gap of D, and patches open from inside "
-        "at the strength G/D (default: zero range; method sharp alone)"
-    )
-    turns = (
-        "turning points in h_max (default 0.9); with --stiffness those of the far side, "
-        "u_tot/h_max; with --preload, where a loop turns at the latest (default 0.999)"
-    )
-    preload = "instead, a machine turns where the mean stress reaches this: in Pa, or 20kPa"
-    weight = "instead, under a weight (--stiffness 0): turning points in Pa, or 20kPa"
-    stiffness = (
-        "in Pa/m of nominal area, or 1GPa/m, of what holds the solid; 0 is load control, that "
-        "of a weight (default: fixed separation)"
-    )
-    layer = "instead: the stiffness of a layer of this thickness, 1mm"
-    declare(
-        group,
-        ("--work-of-adhesion-open G", WORK_OF_ADHESION.option, opened),
-        ("--stripes N", int, stripes),
-        ("--stripe-amplitude EPS", float, "by this share of it, below 1"),
-        ("--stripe-phase PHI", float, "in rad: γ(x) = γ (1 + EPS cos(2π N x/L + PHI)) (default 0)"),
-        ("--measure NAME", None, measure, {"default": "arc"}),
-        ("--adhesion-range D", LENGTH.option, reach),
-        ("--strength S", STRESS.option, "instead, that strength, 10MPa"),
-        ("--max-penetration D[,D…]", None, turns),
-        ("--preload P[,P…]", None, preload),
-        ("--max-stress P[,P…]", None, weight),
-        ("--stiffness K", STIFFNESS.option, stiffness),
-        ("--layer D", LENGTH.option, layer),
-        ("--load-steps N", int, "(default 40)", {"default": 40}),
-    )
-
-
-def add_method_arguments(group: argparse._ArgumentGroup, accuracy: str) -> None:
-    """Declare method and accuracy; ``adhesis loop`` shares them."""
-    declare(
-        group,
-        ("--method NAME", None, "grid, sharp or auto (default auto)", {"default": "auto"}),
-        ("--accuracy", float, accuracy, {"default": 1e-3}),
-    )
-
-
-def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare how a trace is read and prepared; ``adhesis loop --trace`` shares them."""
-    exclude = "a range to bridge, from the first point on, 1.2mm:1.3mm; may be given several times"
-    declare(
-        parser.add_argument_group("reading a trace"),
-        ("--unit U", None, "unit of a text: um, or mm,um for positions and heights"),
-        ("--step S", LENGTH.option, "step, for heights without positions: 0.5um"),
-        ("--columns X,Z", None, "columns of a text, from 1; Z: heights alone"),
-        ("--delimiter C", None, "of a text, if it is not found out"),
-        ("--decimal", None, "decimal sign, if not found out", {"choices": [",", "."]}),
-        ("--row K", int, "row of a map, from 0"),
-        ("--channel K", int, "of an instrument's file, from 0"),
-    )
-    declare(
-        parser.add_argument_group("preparing a trace"),
-        ("--degree N", int, "polynomial subtracted (default 1, or as is seen)"),
-        (
-            "--cut-off W",
-            LENGTH.option,
-            "shortest wave kept: 5um (default from step, noise and tip)",
-        ),
-        ("--tip-radius R", LENGTH.option, "of the stylus or probe: 2um"),
-        ("--longest-gap G", LENGTH.option, "drop-outs up to this length are interpolated: 20um"),
-        ("--exclude A:B", None, exclude, {"action": "append"}),
-        ("--keep-outliers", bool, "leave spikes in"),
-        ("--invert", bool, "z points into the sample: turn it"),
-    )
+_OPENED = (
+    "where an edge recedes, at least that where it advances, --work-of-adhesion; between both it "
+    "is pinned (default: the same)"
+)
+_STRIPES = "the work of adhesion varies N times along the period, about --work-of-adhesion"
+_MEASURE = "adhesion acts on the length of the profile (arc, default) or its projection (flat)"
+_RANGE = (
+    "range of adhesion, 0.3nm; surfaces touch at a gap of D, and patches open from inside at the "
+    "strength G/D (default: zero range; method sharp alone)"
+)
+_TURNS = (
+    "turning points in h_max (default 0.9); with --stiffness those of the far side, u_tot/h_max; "
+    "with --preload, where a loop turns at the latest (default 0.999)"
+)
+_STIFFNESS = (
+    "in Pa/m of nominal area, or 1GPa/m, of what holds the solid; 0 is load control, that of a "
+    "weight (default: fixed separation)"
+)
+# Laws of adhesion, turning points and control, which `adhesis loop` shares; likewise what follows.
+CYCLE = (
+    ("--work-of-adhesion-open G", WORK_OF_ADHESION.option, _OPENED),
+    ("--stripes N", int, _STRIPES),
+    ("--stripe-amplitude EPS", float, "by this share of it, below 1"),
+    ("--stripe-phase PHI", float, "in rad: γ(x) = γ (1 + EPS cos(2π N x/L + PHI)) (default 0)"),
+    ("--measure NAME", None, _MEASURE, {"default": "arc"}),
+    ("--adhesion-range D", LENGTH.option, _RANGE),
+    ("--strength S", STRESS.option, "instead, that strength, 10MPa"),
+    ("--max-penetration D[,D…]", None, _TURNS),
+    (
+        *("--preload P[,P…]", None),
+        "instead, a machine turns where the mean stress reaches this: in Pa, or 20kPa",
+    ),
+    (
+        *("--max-stress P[,P…]", None),
+        "instead, under a weight (--stiffness 0): turning points in Pa, or 20kPa",
+    ),
+    ("--stiffness K", STIFFNESS.option, _STIFFNESS),
+    ("--layer D", LENGTH.option, "instead: the stiffness of a layer of this thickness, 1mm"),
+    ("--load-steps N", int, "(default 40)", {"default": 40}),
+)
+METHOD = ("--method NAME", None, "grid, sharp or auto (default auto)", {"default": "auto"})
+READING = (
+    "reading a trace",
+    ("--unit U", None, "unit of a text: um, or mm,um for positions and heights"),
+    ("--step S", LENGTH.option, "step, for heights without positions: 0.5um"),
+    ("--columns X,Z", None, "columns of a text, from 1; Z: heights alone"),
+    ("--delimiter C", None, "of a text, if it is not found out"),
+    ("--decimal", None, "decimal sign, if not found out", {"choices": [",", "."]}),
+    ("--row K", int, "row of a map, from 0"),
+    ("--channel K", int, "of an instrument's file, from 0"),
+    "preparing a trace",
+    ("--degree N", int, "polynomial subtracted (default 1, or as is seen)"),
+    ("--cut-off W", LENGTH.option, "shortest wave kept: 5um (default from step, noise and tip)"),
+    ("--tip-radius R", LENGTH.option, "of the stylus or probe: 2um"),
+    ("--longest-gap G", LENGTH.option, "drop-outs up to this length are interpolated: 20um"),
+    (
+        *("--exclude A:B", None),
+        "a range to bridge, from the first point on, 1.2mm:1.3mm; may be given several times",
+        {"action": "append"},
+    ),
+    ("--keep-outliers", bool, "leave spikes in"),
+    ("--invert", bool, "z points into the sample: turn it"),
+)
+_GAMMA = (
+    "in J/m², or 20mJ/m2; of several (0.04,0.02,0.08) the first is the answer's, the others make a "
+    "table, as of several turning points"
+)
+OPTIONS = (
+    ("file FILE", Path, "text or instrument's file"),
+    "contact and cycle",
+    ("--work-of-adhesion G", None, _GAMMA, {"required": True}),
+    ("--young E", STRESS.option, "in Pa, or 1MPa", {"required": True}),
+    ("--poisson NU", float, "0.5: incompressible", {"required": True}),
+    *CYCLE,
+    METHOD,
+    ("--accuracy", float, "of each loop (default 1e-3)", {"default": 1e-3}),
+    *READING,
+    "output",
+    ("--to DIR", Path, "for the page, its figures and JSON"),
+    ("--plan", bool, "print the plan, and stop"),
+    ("--quick", bool, "without tables of γ and turning point"),
+    ("--processes N", int, "side by side (default: cores)"),
+    ("--quiet", bool, "no progress on stderr"),
+)
