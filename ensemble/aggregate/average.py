@@ -23,12 +23,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.aggregate.cells import Cell, alike, finished_cells, stress_scale
-from adhesis.ensemble.aggregate.companions import (
+from adhesis.ensemble.aggregate.cells import (
+    Cell,
     Companion,
     LossDifference,
+    alike,
     difference,
+    finished_cells,
     read_companion,
+    stress_scale,
 )
 from adhesis.ensemble.campaign.tables import Axis, Campaign
 from adhesis.ensemble.results.read import Results

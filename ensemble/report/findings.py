@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
-from adhesis.ensemble.aggregate.cells import Cell, alike, doubtful_loops, precisions
-from adhesis.ensemble.aggregate.companions import difference
+from adhesis.ensemble.aggregate.cells import Cell, alike, difference, doubtful_loops, precisions
 from adhesis.ensemble.campaign.tables import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
 from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit

@@ -17,7 +17,7 @@ from matplotlib.image import imread
 from matplotlib.markers import CARETDOWN
 
 from adhesis.ensemble.aggregate.average import BIN_EDGES, BINS_PER_DECADE, aggregate
-from adhesis.ensemble.aggregate.companions import differing_keys, kind_of
+from adhesis.ensemble.aggregate.cells import differing_keys, kind_of
 from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import Campaign

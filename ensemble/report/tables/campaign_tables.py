@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.aggregate.average import SMALL, Aggregate, AveragedCell, fitted_slope
-from adhesis.ensemble.aggregate.cells import Cell, alike
-from adhesis.ensemble.aggregate.companions import difference
+from adhesis.ensemble.aggregate.cells import Cell, alike, difference
 from adhesis.ensemble.campaign.tables import Axis
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
