@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import parameter
-from adhesis.ensemble.quantities import length_text, with_error
+from adhesis.ensemble.outputs import check_output_folder, staged_folder, write_json
+from adhesis.ensemble.quantities import length_text, with_error, with_units
 from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.run.dispatch import Unresponsive
 from adhesis.ensemble.trace.loops import MAX_PENETRATION, Cycle, Loops, Result, Run, Watch
@@ -207,7 +208,12 @@ class Answer(ByValue):
         TypeError
             If ``folder`` is no path.
         """
-        return Path(_views().write_all(self, folder))
+        path = checks.path("folder", folder)
+        check_output_folder("folder", path, (), {})
+        with staged_folder(path, FIGURE_FILES) as staged:
+            _views().write_page(self, staged)
+            write_json(staged / "trace.json", document(self))
+        return path / "trace.html"
 
     def to_dataframe(self) -> Any:
         """Return the numbers of every loop, that of the answer and the others.
@@ -218,7 +224,11 @@ class Answer(ByValue):
             A row for each loop; ``group`` is the doubt or the table that it belongs to.
             ``attrs["units"]`` holds the unit of every column.
         """
-        return _views().table_of_runs(self)
+        import pandas as pd
+
+        rows = pd.DataFrame(run_rows(self)).rename(columns={"said": "description"})
+        rows = rows.drop(columns=["preload_warnings", "warnings", "failed"], errors="ignore")
+        return with_units(rows, self.cycle.control.is_load)
 
     def result(self, name: str) -> Result | None:
         """Numbers of a loop, or None if it failed or was not run."""
