@@ -25,8 +25,7 @@ from adhesis.ensemble.reporter import bar, log
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
     from adhesis.ensemble.campaign.tasks import Part
-    from adhesis.ensemble.run.progress import Summary
-    from adhesis.ensemble.run.session import Engine
+    from adhesis.ensemble.run.session import Engine, Summary
 
 _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
 _MOST = 2**31 - 1
