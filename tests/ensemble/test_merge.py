@@ -14,7 +14,7 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.results import layout
-from adhesis.ensemble.results.head import write_head
+from adhesis.ensemble.results.checksum import write_head
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.merge import merge
 from adhesis.ensemble.results.read import Results

@@ -18,7 +18,7 @@ from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.results import schema
-from adhesis.ensemble.results.head import write_head
+from adhesis.ensemble.results.checksum import write_head
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DATASETS, DONE, FAILED, scales
