@@ -122,14 +122,6 @@ class Uncertain:
         return self.uncertainty / abs(self.value) if self.value else 0.0
 
 
-@dataclass(frozen=True)
-class Change:
-    """Change of the loss by one loop."""
-
-    run: Run
-    factor: float  # its loss over that of the loop with which it is compared; 0 if it loses nothing
-
-
 def _least(name: str, none: str = "") -> Any:
     """Return a property of an answer: the least of a range of adhesion in m."""
 
@@ -258,22 +250,22 @@ class Answer(ByValue):
         return [one for one in found if one is not None]
 
     @property
-    def largest_changes(self) -> tuple[Change, ...]:
-        """The decision about the trace that changes the loss most.
+    def largest_changes(self) -> list[tuple[Run, float]]:
+        """The decision about the trace that changes the loss most, as its loop and a factor.
 
-        If it is a longer cut-off, the one of the other decisions that does so follows.
+        That is its loss over that of the loop with which it is compared; 0 if it loses nothing. If
+        it is a longer cut-off, the one of the other decisions that changes most follows.
         """
         changes = [
-            Change(run, max(1 + change, 0.0))
+            (run, max(1 + change, 0.0))
             for run in self.plan.runs
             if run.group not in ("answer", *TABLES)
             if (change := self.change(run.name)) is not None
         ]
-        changes.sort(key=lambda change: min(change.factor, 1 / (change.factor or math.inf)))
-        others = [change for change in changes[1:] if change.run.group != "cut-off"]
-        if changes and changes[0].run.group == "cut-off":
-            return (changes[0], *others[:1])
-        return tuple(changes[:1])
+        changes.sort(key=lambda change: min(change[1], 1 / (change[1] or math.inf)))
+        others = [change for change in changes[1:] if change[0].group != "cut-off"]
+        is_cut_off = bool(changes) and changes[0][0].group == "cut-off"
+        return changes[:1] + (others[:1] if is_cut_off else [])
 
     def group(self, name: str) -> list[tuple[Run, Result]]:
         """Loops of one doubt or table that came to their end, and their numbers."""
@@ -689,7 +681,7 @@ def document(answer: Answer) -> dict[str, Any]:
             **{"processes": plan.processes, "hints": list(plan.hints)},
         },
         "largest_changes": [
-            {"name": change.run.name, "factor": change.factor} for change in answer.largest_changes
+            {"name": run.name, "factor": factor} for run, factor in answer.largest_changes
         ],
         "warnings": list(answer.warnings),
         "seconds": answer.seconds,

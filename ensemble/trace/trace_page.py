@@ -96,14 +96,11 @@ def _largest_changes(answer: Answer) -> str:
     relative = answer.loss.relative
     low, high = max(1 - relative, 0.0), 1 + relative
     clauses: list[str] = []
-    for change in answer.largest_changes:
-        run = change.run
+    for run, factor in answer.largest_changes:
         against = "" if run.reference == "answer" else f", against “{run.reference}”"
         of = "of the other decisions " if clauses else "most "
-        beyond = "" if low <= change.factor <= high else ", beyond the interval"
-        clauses.append(
-            f"{of}by “{run.name}” ({run.description}{against}): × {change.factor:.3g}{beyond}"
-        )
+        beyond = "" if low <= factor <= high else ", beyond the interval"
+        clauses.append(f"{of}by “{run.name}” ({run.description}{against}): × {factor:.3g}{beyond}")
     return "; ".join(clauses) or "no other decision about the trace could be run"
 
 
