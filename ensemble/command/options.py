@@ -7,7 +7,6 @@ import math
 import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,64 +17,47 @@ from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.trace.loops import MAX_PENETRATION
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
-from adhesis.solver.loading.cycle import check_cycle, latest_turn, turn_arguments
-from adhesis.solver.loading.path import check_path
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.pattern import AdhesionPattern, stripes_of
-from adhesis.solver.model.problem import Problem
 
 _TURNS = ("max_penetration", "max_stress", "preload")
+_OF_CYCLE = (
+    *("load_steps", "method", "accuracy", "adhesion_range", "strength"),
+    *("work_of_adhesion_open", "measure"),
+)
 
 
-@dataclass(frozen=True)
-class Cycle:
-    """Loading path and control of a loop.
+def settings_of(args: argparse.Namespace, half_space: HalfSpace) -> dict[str, Any]:
+    """Read contact and path, as fields of a cycle (InputError; ValueError for stiffness or layer).
 
-    The turning points are one for each loop; those of one path, in order, if ``is_path``.
+    A path has its turning points in order; loops have theirs as they are given.
     """
-
-    # Δ/h_max, u_tot/h_max, or Pa under a load; preloads in Pa, if ``are_preloads``
-    points: tuple[float, ...]
-    control: Control
-    load_steps: int
-    are_preloads: bool = False
-    latest: float | None = None  # where a loop turns whose preload is not reached, if it is given
-    is_path: bool = False
-    out: bool = True  # whether a path continues until contact is lost
-
-    def arguments(self, points: object) -> dict[str, Any]:
-        """Return the arguments of ``run_loop`` or ``run_loops`` for some of the points."""
-        return turn_arguments(self.control, points, self.are_preloads, self.latest)
-
-    def check(self, problem: Problem) -> None:
-        """Check that the cycle can be followed; the ValueError gives the rule that it breaks."""
-        if self.is_path:
-            check_path(self.points, self.load_steps, problem, self.out)
-            return
-        for turn in self.points:
-            end = latest_turn(problem, turn, self.latest) if self.are_preloads else turn
-            check_cycle(end, self.load_steps, self.control)
-
-
-def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
-    """Read the cycle from the options (InputError; ValueError for stiffness or layer)."""
     control = control_of(args, half_space)
-    if args.path is not None:
-        refuse_several(args, "path", *_TURNS)
-        turns, comma, last = args.path.rpartition(",")
-        out = last.strip() == "out"
-        if out and not comma:
-            raise InputError(f"--path is {quoted(args.path)}: it holds no turning point")
-        rule = "numbers with commas between them, and perhaps 'out' behind the last"
-        points = read_list("--path", turns if out else args.path, rule=rule, given=args.path)
-        return Cycle(points, control, args.load_steps, is_path=True, out=out)
-    cycle = turns_of(args, control)
-    return replace(cycle, points=tuple(sorted(cycle.points)))
+    is_path = getattr(args, "path", None) is not None
+    turns = {"turning_points": _path(args)} if is_path else turns_of(args, control)
+    pattern = pattern_of(args)
+    settings = {name: getattr(args, name) for name in _OF_CYCLE}
+    return {"half_space": half_space, "control": control, "pattern": pattern, **turns, **settings}
 
 
-def turns_of(args: argparse.Namespace, control: Control) -> Cycle:
-    """Read the cycle of a control, its turning points in the given order (InputError)."""
+def ends_out(path: str) -> bool:
+    """Return whether a path continues until contact is lost."""
+    return path.rpartition(",")[2].strip() == "out"
+
+
+def _path(args: argparse.Namespace) -> tuple[float, ...]:
+    refuse_several(args, "path", *_TURNS)
+    turns, comma, _ = args.path.rpartition(",")
+    out = ends_out(args.path)
+    if out and not comma:
+        raise InputError(f"--path is {quoted(args.path)}: it holds no turning point")
+    rule = "numbers with commas between them, and perhaps 'out' behind the last"
+    return read_list("--path", turns if out else args.path, rule=rule, given=args.path)
+
+
+def turns_of(args: argparse.Namespace, control: Control) -> dict[str, Any]:
+    """Read turning points in the given order, as fields of a cycle (InputError)."""
     refuse_several(args, "max_stress", "preload")
     if control.is_load:
         if args.preload is not None:
@@ -87,8 +69,7 @@ def turns_of(args: argparse.Namespace, control: Control) -> Cycle:
         refuse_several(args, "max_penetration", "max_stress")
         if args.max_stress is None:
             raise InputError("load control (--stiffness 0) needs --max-stress, in Pa")
-        stresses = _distinct("--max-stress", args.max_stress, STRESS.read)
-        return Cycle(stresses, control, args.load_steps)
+        return {"turning_points": _distinct("--max-stress", args.max_stress, STRESS.read)}
     if args.max_stress is not None:
         raise InputError(
             "--max-stress belongs to load control, and --stiffness 0 is not given: a weight or a "
@@ -102,14 +83,15 @@ def turns_of(args: argparse.Namespace, control: Control) -> Cycle:
     if args.max_penetration is not None:
         penetrations = _distinct("--max-penetration", args.max_penetration, float, rule)
     if args.preload is None:
-        return Cycle(penetrations or (MAX_PENETRATION,), control, args.load_steps)
+        return {"turning_points": penetrations or (MAX_PENETRATION,)}
     if len(penetrations) > 1:
         raise InputError(
             f"--max-penetration is {args.max_penetration} beside --preload: it must be one number, "
             "at which a loop turns that has not reached its preload"
         )
     preloads = _distinct("--preload", args.preload, STRESS.read)
-    return Cycle(preloads, control, args.load_steps, True, next(iter(penetrations), None))
+    latest = next(iter(penetrations), None)
+    return {"turning_points": preloads, "at_preload": True, "latest": latest}
 
 
 def _distinct(

@@ -6,11 +6,9 @@ import argparse
 import sys
 
 from adhesis.ensemble.command.options import (
-    control_of,
     in_options,
-    pattern_of,
     prepared_of,
-    turns_of,
+    settings_of,
     what_was_read,
 )
 from adhesis.ensemble.errors import InputError, refused_as_input
@@ -40,14 +38,8 @@ def execute(args: argparse.Namespace) -> int:
     gammas = read_list("--work-of-adhesion", args.work_of_adhesion, WORK_OF_ADHESION.read)
     with refused_as_input(vars(args), thickness="layer"):
         half_space = HalfSpace(args.young, args.poisson)
-        control = control_of(args, half_space)
-        turns = turns_of(args, control)
-        cycle = make_cycle(
-            half_space, gammas, turns.points, args.load_steps, args.method, args.accuracy, control,
-            args.adhesion_range, args.strength, at_preload=turns.are_preloads, latest=turns.latest,
-            work_of_adhesion_open=args.work_of_adhesion_open, measure=args.measure,
-            pattern=pattern_of(args),
-        )  # fmt: skip
+        settings = settings_of(args, half_space)
+        cycle = make_cycle(works_of_adhesion=gammas, **settings)
     if args.to is not None:
         check_output_folder("--to", args.to, FILES, {"the command": args.file})
     prepared = prepared_of(args, args.file)

@@ -411,20 +411,14 @@ def loss_of_trace(
     return run_plan(prepared, cycle, plan, watch, checks.flag("progress", progress))
 
 
-def make_cycle(
-    half_space: HalfSpace,
-    work_of_adhesion: Several,
-    turning_points: Several,
-    *settings: Any,
-    **named: Any,
-) -> Cycle:
+def make_cycle(*settings: Any, **named: Any) -> Cycle:
     """Make contact and cycle, with the values of both tables (TypeError, ValueError).
 
-    The settings are the fields of a Cycle from ``load_steps`` on. A single γ is completed by half
-    and twice of it, a single turning point by one and two thirds.
+    The settings are the fields of a Cycle; works of adhesion and turning points may be numbers. A
+    single γ is completed by half and twice of it, a single turning point by one and two thirds.
     """
-    given = _several("work_of_adhesion", work_of_adhesion)
-    cycle = Cycle(half_space, given, (), *settings, **named)
+    cycle = Cycle(*settings, **named)
+    given = _several("work_of_adhesion", cycle.works_of_adhesion)
     checks.choice("method", cycle.method, METHOD_NAMES)
     checks.real("accuracy", cycle.accuracy, checks.ACCURACY)
     if cycle.work_of_adhesion_open is not None and len(given) > 1:
@@ -433,7 +427,7 @@ def make_cycle(
             "of adhesion: give one of each (in the table both keep their ratio)"
         )
     control, turning = cycle.control, cycle.turning.parameter
-    gammas, turns = given, _several(turning, turning_points)
+    gammas, turns = given, _several(turning, cycle.turning_points)
     if len(gammas) == 1 and 0 < gammas[0] < np.inf:
         gammas = (gammas[0], gammas[0] / 2, gammas[0] * 2)
     if len(turns) == 1:
