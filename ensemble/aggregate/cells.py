@@ -17,10 +17,9 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.campaign.compare import differing
 from adhesis.ensemble.campaign.precision import Precision, precision
 from adhesis.ensemble.campaign.rules import shown
-from adhesis.ensemble.campaign.tables import Axis, Campaign
+from adhesis.ensemble.campaign.tables import Axis, Campaign, differing
 from adhesis.ensemble.campaign.tasks import name_at
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.interval import Estimate, estimates

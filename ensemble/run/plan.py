@@ -13,9 +13,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.precision import Batches
-from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tables import Campaign, growth
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.errors import InputError, parameter
 from adhesis.ensemble.quantities import bytes_text

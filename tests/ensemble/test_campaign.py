@@ -11,9 +11,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
-from adhesis.ensemble.campaign.tables import TABLES
+from adhesis.ensemble.campaign.tables import TABLES, growth
 from adhesis.ensemble.campaign.tasks import Part
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.task.compute import make_problem

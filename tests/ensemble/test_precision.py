@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from adhesis.ensemble.aggregate.status import as_text, read_status
-from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.precision import (
     LEAST,
@@ -18,6 +17,7 @@ from adhesis.ensemble.campaign.precision import (
     precision,
     precision_lines,
 )
+from adhesis.ensemble.campaign.tables import growth
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.interval import estimates, interval
 from adhesis.ensemble.report import findings
