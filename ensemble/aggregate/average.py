@@ -241,11 +241,6 @@ class AveragedCell(Cell):
     fields: FieldStatistics
 
 
-def _sum(name: str, doc: str) -> Any:
-    """Return a property of an aggregate: the sum of a number of its cells."""
-    return property(lambda data: sum(getattr(cell, name) for cell in data.cells), doc=doc)
-
-
 @dataclass(frozen=True, eq=False)
 class Aggregate:
     """Averages and metadata of a results file that a report needs."""
@@ -261,9 +256,20 @@ class Aggregate:
     doubts: tuple[str, ...] = ()
     damaged: int = 0  # number of damaged rows of this file
 
-    done = _sum("done", "Number of finished tasks.")
-    failed = _sum("failed", "Number of failed tasks.")
-    pending = _sum("pending", "Number of tasks that wait, or are being computed.")
+    @property
+    def done(self) -> int:
+        """Number of finished tasks."""
+        return sum(cell.done for cell in self.cells)
+
+    @property
+    def failed(self) -> int:
+        """Number of failed tasks."""
+        return sum(cell.failed for cell in self.cells)
+
+    @property
+    def pending(self) -> int:
+        """Number of tasks that wait, or are being computed."""
+        return sum(cell.pending for cell in self.cells)
 
     @property
     def total(self) -> int:
