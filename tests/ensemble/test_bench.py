@@ -109,6 +109,7 @@ def test_figure_has_a_panel_for_each_scene_even_if_nothing_finished():
     draw([failed("sharp", 1e-3)])
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_command_writes_table_records_and_figure(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(benchmarking, "measure", fake_measure)
     assert main(["bench", "--quick", "--to", str(tmp_path / "new")]) == 0
