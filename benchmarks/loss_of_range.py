@@ -1,13 +1,12 @@
-"""Loss against the range of adhesion, of ``sharp`` and of an independent minimisation.
+"""Loss against the range of adhesion, by ``sharp`` and by ``zones``.
 
     python benchmarks/loss_of_range.py table [--scenes paper 1GPa steel] [--most-nodes 40000]
     python benchmarks/loss_of_range.py figure OUT.png
 
 The first prints the loss of loops at ranges that are shares of ``edge_range``, over that of zero
-range: ``sharp`` with that range in the model, where it is allowed, and the minimisation of the
-energy on a grid (``finite_range.py``, law and steps of its loops), where its nodes resolve the
-zones. What it printed is kept in ``loss_of_range.txt``, of which the second draws
-docs/figures/loss_of_range.png.
+range: by ``sharp``, which leaves zones out and opens nothing from inside, where it takes the range,
+and by ``zones``, where no more than so many nodes resolve the zones. What it printed is kept in
+``loss_of_range.txt``, of which the second draws docs/figures/loss_of_range.png.
 
 Scenes of H = 0.8, h_rms = 1 µm, γ = 0.04 J/m², ν = 0.5, Δ/h_max = 0.9: the paper's profile with
 seed 1; and n0 = 2, ratio 25, period 2 mm, seed 0 with E = 1 GPa and 200 GPa.
@@ -19,11 +18,10 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from finite_range import NODES_OF_ZONE, GridLoop
-from scipy.fft import next_fast_len
 
 from adhesis import HalfSpace, Problem, make_method, run_loop, self_affine_profile
 from adhesis.solver.method import PathError
+from adhesis.solver.zones.resolution import node_count
 
 GAMMA, DEPTH = 0.04, 0.9
 NARROW = {"period": 2e-3, "n0": 2, "ratio": 25, "seed": 0}
@@ -38,7 +36,7 @@ TITLES = {
     "steel": "ratio 25, E = 200 GPa",
 }
 SHARES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.67, 1.0, 1.5, 2.0)  # of edge_range
-HEAD = "scene edge_share range_nm sharp openings barrier warnings grid nodes"
+HEAD = "scene edge_share range_nm sharp doubts zones from_drops error seconds nodes"
 KEPT = Path(__file__).with_suffix(".txt")
 
 
@@ -47,23 +45,6 @@ def problem_of(scene: str, adhesion_range: float | None = None) -> Problem:
     shape, young = SCENES[scene]
     profile = self_affine_profile(0.8, h_rms=1e-6, **shape)
     return Problem(profile, HalfSpace(young, 0.5), GAMMA, adhesion_range=adhesion_range)
-
-
-def loss_on_grid(problem: Problem, delta: float, nodes: int, share: float) -> float:
-    """Loss in J/m² by the minimisation at a range in m; ``share`` is that of a step."""
-    q0, modulus = problem.profile.q0, problem.half_space.modulus
-    height = q0 * problem.profile.heights(nodes)
-    grid = GridLoop(height, GAMMA * q0 / modulus, delta * q0)
-    turn, step = q0 * problem.separation(DEPTH), 2 * delta * q0
-    return float(grid.loss(turn, step, share * q0 / modulus) * modulus / q0)
-
-
-def nodes_of(problem: Problem, delta: float) -> int:
-    """Nodes that resolve waves and zones."""
-    zone = np.pi / 4 * problem.half_space.modulus * delta**2 / GAMMA
-    of_zones = NODES_OF_ZONE * problem.profile.period / zone
-    most = max(of_zones, 16 * problem.profile.highest_harmonic)
-    return int(next_fast_len(int(np.ceil(most)), real=True))
 
 
 def table(scenes: list[str], most_nodes: int, shares: list[float]) -> None:
@@ -75,19 +56,21 @@ def table(scenes: list[str], most_nodes: int, shares: list[float]) -> None:
         print(f"# {scene}: {zero.loss:.6g} J/m²; valid edge touch turn {ranges} nm", flush=True)
         for share in shares:
             delta = share * zero.edge_range
-            cells = ["-"] * 4
+            problem, cells = problem_of(scene, delta), ["-"] * 6
+            nodes = node_count(problem)
             try:
-                ranged = problem_of(scene, delta)
-                loop = run_loop(make_method("sharp", ranged), max_penetration=DEPTH)
-                cells = [f"{loop.loss / zero.loss:.5f}", f"{loop.openings}"]
-                cells += ["-", f"{len(loop.warnings)}"]
+                loop = run_loop(make_method("sharp", problem), max_penetration=DEPTH)
+                cells[:2] = f"{loop.loss / zero.loss:.5f}", f"{len(loop.range_warnings())}"
             except (ValueError, PathError) as error:  # the range is refused, or the path is lost
                 print(f"# {str(error)[:100]}")
-            nodes, grid = nodes_of(zero.problem, delta), "-"
             if nodes <= most_nodes:
-                loss = loss_on_grid(zero.problem, delta, nodes, 0.01 * zero.loss)
-                grid = f"{loss / zero.loss:.5f}"
-            print(f"{scene} {share:g} {1e9 * delta:.4g}", *cells, grid, nodes, flush=True)
+                loop = run_loop(make_method("zones", problem), max_penetration=DEPTH)
+                lost = loop.loss_from_drops / zero.loss
+                cells[2:] = (
+                    f"{loop.loss / zero.loss:.5f}", f"{lost:.5f}",
+                    f"{loop.loss_error / zero.loss:.2g}", f"{loop.seconds:.0f}",
+                )  # fmt: skip
+            print(f"{scene} {share:g} {1e9 * delta:.4g}", *cells, nodes, flush=True)
 
 
 def figure(path: Path) -> None:
@@ -105,14 +88,15 @@ def figure(path: Path) -> None:
         valid, edge, touch, _ = map(float, head.removesuffix(" nm").split()[-4:])
         rows = np.array([line.split() for line in lines if line.startswith(f"{scene} ")])
         numbers = np.where(rows[:, 2:] == "-", "nan", rows[:, 2:]).astype(float)
-        delta, sharp, _, _, warnings, grid = numbers.T[:6]
-        known, sure = np.isfinite(sharp), warnings == 0
+        delta, sharp, doubts, zones, _, error = numbers.T[:6]
+        known, sure = np.isfinite(sharp), doubts == 0
         axes.plot(delta[known], sharp[known], "-", color="#1f5fa8", lw=1, label="sharp")
         axes.plot(delta[sure], sharp[sure], "o", color="#1f5fa8", ms=5, label="without a doubt")
         doubtful = known & ~sure
         open_ = {"mfc": "white", "color": "#1f5fa8", "ms": 5, "label": "doubtful"}
         axes.plot(delta[doubtful], sharp[doubtful], "o", **open_)
-        axes.plot(delta, grid, "x", color="#c4472b", ms=7, label="minimisation")
+        style = {"fmt": "x", "color": "#c4472b", "ms": 7, "label": "zones"}
+        axes.errorbar(delta, zones, error, **style)
         for name, at in (("inside", valid), ("edge", edge), ("touch", touch)):
             if at > 2 * delta.max():
                 continue

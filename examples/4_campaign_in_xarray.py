@@ -17,7 +17,7 @@ import adhesis
 # process. ``campaign.run(out, ranks=9)`` shares them out, as ``mpirun -n 9 adhesis run`` does.
 campaign = adhesis.Campaign(
     {
-        "profile": {"period": 2e-3, "n0": 4, "ratio": 16, "h_rms": 1e-6},
+        "profile": {"period": 2e-3, "n0": 4, "ratio": 8, "h_rms": 1e-6},
         "material": {"young": 1e6, "poisson": 0.5},
         "sweep": {
             "hurst": [0.7, 0.9],

@@ -20,7 +20,7 @@ STEP_GROWTH: float
 STEP_REDUCTION: float
 
 class Panels:
-    def __init__(self, *, width: float, finest_count: int, x: numpy.typing.NDArray[numpy.float64], w: numpy.typing.NDArray[numpy.float64], stress: numpy.typing.NDArray[numpy.float64], slope: numpy.typing.NDArray[numpy.float64], tilt: numpy.typing.NDArray[numpy.float64], pattern: numpy.typing.NDArray[numpy.float64], half_plane: Sequence[numpy.typing.NDArray[numpy.float64]], weights: Sequence[numpy.typing.NDArray[numpy.float64]], level_start: numpy.typing.NDArray[numpy.int64], end_x: numpy.typing.NDArray[numpy.float64], end_w: numpy.typing.NDArray[numpy.float64], short_count: int, length_x: numpy.typing.NDArray[numpy.float64], length_w: numpy.typing.NDArray[numpy.float64], length_before: numpy.typing.NDArray[numpy.float64], highest_harmonic: int) -> None: ...
+    def __init__(self, *, width: float, finest_count: int, x: numpy.typing.NDArray[numpy.float64], w: numpy.typing.NDArray[numpy.float64], stress: numpy.typing.NDArray[numpy.float64], slope: numpy.typing.NDArray[numpy.float64], tilt: numpy.typing.NDArray[numpy.float64], pattern: numpy.typing.NDArray[numpy.float64], half_plane: Sequence[numpy.typing.NDArray[numpy.float64]], weights: Sequence[numpy.typing.NDArray[numpy.float64]], level_start: numpy.typing.NDArray[numpy.int64], end_x: numpy.typing.NDArray[numpy.float64], end_w: numpy.typing.NDArray[numpy.float64], length_x: numpy.typing.NDArray[numpy.float64], length_w: numpy.typing.NDArray[numpy.float64], length_before: numpy.typing.NDArray[numpy.float64], highest_harmonic: int) -> None: ...
 
     def stress(self, theta: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]: ...
 
@@ -185,16 +185,12 @@ class Equilibrium:
     @property
     def pinned_rate(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
-    def solve_field(self, prescribed: float, model: FieldModel) -> Field: ...
-
 class DescentEvent(enum.Enum):
     AT_REST = 0
 
     VANISHED = 1
 
-    STEP_LIMIT = 2
-
-    NO_FIELD = 3
+    NO_FIELD = 2
 
 class Descent:
     @property
@@ -253,12 +249,12 @@ class SearchedGaps:
 
 def search(field: Field, searched: SearchedGaps, lengths: SearchLengths) -> tuple[float, int, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]], SearchedGaps]: ...
 
-class FoldAhead:
+class LeadingEdge:
     @property
     def edge(self) -> int: ...
 
     @property
-    def distance(self) -> float: ...
+    def fold_distance(self) -> float: ...
 
 class Predictor:
     def __init__(self, d: float, gaps: numpy.typing.NDArray[numpy.float64], rate: numpy.typing.NDArray[numpy.float64], before: tuple[float, numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]] | None) -> None: ...
@@ -276,9 +272,9 @@ class Predictor:
     def way(self) -> float: ...
 
     @property
-    def fold(self) -> FoldAhead: ...
+    def leading(self) -> LeadingEdge: ...
 
-    def other_fold(self) -> FoldAhead: ...
+    def other_leading(self) -> LeadingEdge: ...
 
     def predict_gaps(self, at: float) -> NDArray[numpy.float64]: ...
 

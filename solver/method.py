@@ -206,6 +206,8 @@ class Method(NotebookDisplay, ABC):
     nodes: int | None = None
     resolved_adhesion: ClassVar[tuple[float, float]] = (0.0, math.inf)
     """Least and largest γ that the method resolves, over the elastic energy of full contact."""
+    has_zones: ClassVar[bool] = False
+    """Whether adhesion acts over zones of finite length, so that a range leaves nothing out."""
 
     _built_from: tuple[tuple[Any, ...], dict[str, Any]]
 

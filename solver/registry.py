@@ -11,8 +11,14 @@ from adhesis.solver.method import Method
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.runtime.uninterrupted import uninterrupted
 
-MethodName = Literal["grid", "sharp", "auto"]
+MethodName = Literal["grid", "sharp", "zones", "auto"]
 METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)
+
+# With a range ``auto`` takes ``zones`` where ``sharp`` may be wrong: zones are longer than this
+# share of the shortest wave, or the strength is below this share of E*h', h' the rms slope, which
+# bounds the tension by which roughness opens patches. Not with more nodes than these.
+_LONG_ZONE, _OPENS = 1 / 32, 0.7
+_NODES_OF_ZONES = 1 << 16
 
 
 def make_method(
@@ -26,12 +32,13 @@ def make_method(
 
     Parameters
     ----------
-    name : {"grid", "sharp", "auto"}
+    name : {"grid", "sharp", "zones", "auto"}
     problem : Problem
     accuracy : float
         Wanted relative error of the loss, 1e-10 ≤ accuracy < 1.
     nodes_per_wave : int, optional
-        For ``grid``: nodes per shortest wave; by default derived from ``accuracy``.
+        For ``grid`` and ``zones``: least number of nodes per shortest wave; by default derived
+        from ``accuracy``, and for ``zones`` from the length of zones.
 
     Raises
     ------
@@ -54,45 +61,61 @@ def make_method(
     choice("method", name, METHOD_NAMES)
     instance("problem", problem, Problem, "Problem(profile, half_space, work_of_adhesion)")
     accuracy = real("accuracy", accuracy, ACCURACY)
-    has_range = math.isfinite(problem.strength)
-    check_law(name, nodes_per_wave, pins=problem.pinning > 0, has_range=has_range)
+    if problem.work_of_adhesion > 0:
+        has_range = math.isfinite(problem.strength)
+        check_law(name, nodes_per_wave, pins=problem.pinning > 0, has_range=has_range)
     if nodes_per_wave is not None:
         nodes_per_wave = whole("nodes_per_wave", nodes_per_wave, NODES_PER_WAVE)
         check_nodes(nodes_per_wave, problem.highest_harmonic)
         if name == "sharp":
             raise ValueError(
-                f"nodes_per_wave is {nodes_per_wave}: it belongs to the method 'grid' alone"
+                f"nodes_per_wave is {nodes_per_wave}: it belongs to the methods 'grid' and 'zones'"
             )
     chosen = None
-    if name == "auto":
-        name, chosen = choose(problem, nodes_per_wave)
+    if name == "auto" or (name == "zones" and problem.work_of_adhesion == 0):
+        asked = name
+        name, reason = choose(problem, nodes_per_wave)
+        chosen = f"{asked}: {name}, {reason}"
     # an interrupted import leaves incomplete modules behind
     uninterrupted(import_module)(f"adhesis.solver.{name}.method")
-    if name == "grid":
-        from adhesis.solver.grid.method import GridMethod
+    if name == "sharp":
+        from adhesis.solver.sharp.method import SharpMethod
 
-        return GridMethod(problem, nodes_per_wave=nodes_per_wave, accuracy=accuracy, chosen=chosen)
-    from adhesis.solver.sharp.method import SharpMethod
+        return SharpMethod(problem, accuracy=accuracy, chosen=chosen)
+    if name == "zones":
+        from adhesis.solver.zones.method import ZonesMethod
 
-    return SharpMethod(problem, accuracy=accuracy, chosen=chosen)
+        return ZonesMethod(problem, nodes_per_wave=nodes_per_wave, accuracy=accuracy, chosen=chosen)
+    from adhesis.solver.grid.method import GridMethod
+
+    return GridMethod(problem, nodes_per_wave=nodes_per_wave, accuracy=accuracy, chosen=chosen)
 
 
 def check_law(name: MethodName, nodes_per_wave: int | None, *, pins: bool, has_range: bool) -> None:
-    """Refuse the method ``grid`` for two works of adhesion, and for a range of adhesion.
+    """Refuse a method whose edges do not have the law of adhesion that is given.
 
     Raises
     ------
     ValueError
-        If it is named, or meant by a number of nodes.
+        For ``grid`` beside a range or two works of adhesion, for ``zones`` without a range; the
+        former also where it is meant by a number of nodes.
     """
-    if (name != "grid" and nodes_per_wave is None) or not (pins or has_range):
-        return
+    if name == "zones" and not has_range:
+        raise ValueError(
+            "method is 'zones' without a range or strength of adhesion: give one of them, or leave "
+            "the method out"
+        )
     given = "method is 'grid'" if name == "grid" else f"nodes_per_wave is {nodes_per_wave}"
-    beside = "a work_of_adhesion_open above the work of adhesion"
-    reason = "has edges that recede at another one"
-    if has_range:
-        beside, reason = "a range or strength of adhesion", "has adhesion that acts over a range"
-    raise ValueError(f"{given} beside {beside}: leave it out, as only the method 'sharp' {reason}")
+    if name == "grid" and has_range:
+        raise ValueError(
+            f"{given} beside a range or strength of adhesion: leave it out, or take the method "
+            "'zones'"
+        )
+    if pins and (name == "grid" or nodes_per_wave is not None):
+        raise ValueError(
+            f"{given} beside a work_of_adhesion_open above the work of adhesion: leave it out, as "
+            "only the method 'sharp' has edges that recede at another one"
+        )
 
 
 def check_nodes(nodes_per_wave: int, waves: int) -> None:
@@ -112,15 +135,28 @@ def check_nodes(nodes_per_wave: int, waves: int) -> None:
 
 def choose(
     problem: Problem, nodes_per_wave: int | None = None
-) -> tuple[Literal["grid", "sharp"], str]:
-    """Choose the method for a problem; returns its name and the reason in one sentence.
+) -> tuple[Literal["grid", "sharp", "zones"], str]:
+    """Choose the method for a problem; returns its name and the reason.
 
     The error of ``sharp`` is that of its tolerances, on any spectrum, and with adhesion it is much
     the faster one (docs/methods.md). Without adhesion there are many more patches, and the loss is
     zero at any resolution.
     """
-    if nodes_per_wave is not None:
-        return "grid", "auto: grid, as a number of nodes per wave is given"
     if problem.work_of_adhesion == 0:
-        return "grid", "auto: grid, as there is no adhesion and so no loss to resolve"
-    return "sharp", "auto: sharp, whose error of the loss is that of its tolerances, not of a grid"
+        return "grid", "as there is no adhesion and so no loss to resolve"
+    if math.isfinite(problem.strength):
+        from adhesis.solver.zones.resolution import node_count, zone_length
+
+        nodes = node_count(problem, nodes_per_wave)
+        if nodes_per_wave is not None:
+            return "zones", "as a number of nodes per wave is given"
+        opening = problem.half_space.modulus * math.sqrt(problem.profile.m2)
+        opens = problem.strength < _OPENS * opening
+        if not opens and zone_length(problem) < _LONG_ZONE * problem.shortest_wavelength:
+            return "sharp", "as zones of this range are short, and roughness opens no patch"
+        if nodes > _NODES_OF_ZONES:
+            return "sharp", f"as zones of this range would need {nodes:,} nodes"
+        return "zones", "as zones of this range are not short, or roughness may open patches"
+    if nodes_per_wave is not None:
+        return "grid", "as a number of nodes per wave is given"
+    return "sharp", "whose error of the loss is that of its tolerances, not of a grid"

@@ -12,13 +12,18 @@ from typing import Any
 
 import pytest
 
-from tests.support import one_thread  # noqa: F401  # before what loads numpy
+from adhesis.ensemble.run.launch import ONE_THREAD
 from tests.support.figures import few_figures
 from tests.support.launcher_crash import pytest_runtest_protocol  # noqa: F401  # a hook
 from tests.support.launchers import without_mpi, without_slurm
 from tests.support.progress import Waiting
 from tests.support.scheduling import rank_of, scheduler
 from tools.interrupted import Interrupt
+
+# Before numpy is loaded, in all processes of the tests: threads for small matrices wait for one
+# another on a busy machine, and one module took 50 times as long.
+for variable, count in ONE_THREAD.items():
+    os.environ.setdefault(variable, count)
 
 # Byte code is kept, or each process compiles all that it imports: seconds of the time of a command.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -82,7 +87,6 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
 def pytest_collection_finish() -> None:
     """Spare the garbage collector all that was imported and collected, which stays to the end."""
-    gc.collect()
     gc.freeze()
     gc.enable()
 

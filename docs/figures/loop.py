@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from adhesis import HalfSpace, LoopResult, Problem, make_method, run_loop, self_affine_profile
-from adhesis.ensemble.loop.film_scenes import Scene, Scenes, scenes_of
+from adhesis.ensemble.loop.film import Scene, Scenes, scenes_of
 from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, MM, TWO_COLUMNS, style
 
 COLOURS = {"loading": "#0072B2", "unloading": "#D55E00"}

@@ -1,14 +1,19 @@
 """Average over realisations, from a results file alone.
 
 A cell is one point on the axes of the campaign: an (H, γ), and a value of each further list.
-Scalars of all tasks fit in memory; curves do not, so they pass through a bounded block of columns
-at a time. Only rows whose status is "done" are read: the status byte is written last, so the
+Scalars of all tasks fit in memory; curves, fields and jumps do not, so they pass through a bounded
+block at a time. Only rows whose status is "done" are read: the status byte is written last, so the
 averages of a file that a run is still writing are consistent.
+
+A state without contact is not deformed and left out of the averages of fields, so each has its own
+number of realisations. The catalogue of jumps (task × jump) has of a task with more jumps than it
+holds those with the largest drops; ``truncated`` counts such tasks. The jump at which a weight
+falls off is not counted: its drop depends on where the loop is closed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import chain, pairwise
@@ -18,29 +23,196 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.aggregate.by_blocks import (
-    Curve,
-    FieldStatistics,
-    JumpStatistics,
-    average_curves,
-    average_fields,
-    count_jumps,
-)
-from adhesis.ensemble.aggregate.cells import Cell, alike, finished_cells, stress_scale
-from adhesis.ensemble.aggregate.companions import (
+from adhesis.ensemble.aggregate.cells import (
+    Cell,
     Companion,
     LossDifference,
+    alike,
     difference,
+    finished_cells,
     read_companion,
+    stress_scale,
 )
 from adhesis.ensemble.campaign.tables import Axis, Campaign
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import FAILED
 from adhesis.ensemble.task.dataset import KEPT
+from adhesis.ensemble.task.fields import FieldPlan
 from adhesis.solver.method import BRANCHES
+from adhesis.solver.model.jump import JUMP_KINDS, SMALL_SCALE
+from adhesis.solver.model.profile import Array
 
 _MAX_FAILURES = 20
 _H_AND_GAMMA = frozenset(("hurst", "work_of_adhesion"))
+
+
+# Numbers read at once (8 bytes each): large enough for the disk, small enough for any machine.
+READ_AT_ONCE = 2_000_000
+# Numbers held at once while quantiles are taken (numpy copies them once more).
+HELD_AT_ONCE = 8_000_000
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+_AVERAGED = ("psd_height", "height_density", "psd_displacement", "gap_density")
+_OF_SHAPE = ("field_height", "field_displacement")
+BINS_PER_DECADE = 2
+# From 1e-16 to 100 J/m²; energy drops beyond are counted in the outermost bin.
+BIN_EDGES: Array = np.logspace(-16, 2, 1 + 18 * BINS_PER_DECADE)
+SMALL = np.array([kind in SMALL_SCALE for kind in JUMP_KINDS])
+"""Whether jumps of a kind only move edges inside existing patches, shape (kinds,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A quantity on the penetration axis of one branch, over the realisations of a cell."""
+
+    # mean, std: shape (points,); std has n - 1 in the denominator; NaN for one realisation. A
+    # realisation that has detached is counted, as zero.
+    mean: Array
+    std: Array
+    quantiles: Array  # shape (len(QUANTILES), points)
+
+
+def average_curves(
+    results: Results, name: str, rows: NDArray[np.intp], scales: Mapping[str, Array]
+) -> dict[str, Curve]:
+    """Average a dataset over the rows of a cell; NaN for a cell without rows.
+
+    ``scales`` holds the factor of each row, by curve to make of the dataset.
+    """
+    points = results.column(name, slice(0, 1)).shape[1]
+    shapes = (points, points, (len(QUANTILES), points))
+    out = {curve: Curve(*(np.full(shape, np.nan) for shape in shapes)) for curve in scales}
+    for columns in _blocks(points, rows.size, HELD_AT_ONCE) if rows.size else ():
+        raw = results.column(name, rows, columns).astype(float)
+        if name.endswith("patches"):  # -1 beyond the turning point of a load: not known
+            raw[raw < 0] = np.nan
+        for curve, factors in scales.items():
+            values = raw * factors[:, None]
+            out[curve].mean[columns] = values.mean(axis=0)
+            if rows.size > 1:
+                out[curve].std[columns] = values.std(axis=0, ddof=1)
+            out[curve].quantiles[:, columns] = np.quantile(
+                values, QUANTILES, axis=0, overwrite_input=True
+            )
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class DeformedShape:
+    """Fields of one realisation."""
+
+    height: Array  # shape (nodes,); rigid profile h in m
+    # Shape (2, penetrations, nodes); deformed surface v in m, loading and unloading; NaN where
+    # there is no contact
+    displacement: Array
+
+
+@dataclass(frozen=True, eq=False)
+class FieldStatistics:
+    """Averages of one cell; NaN without finished tasks.
+
+    Penetrations, wave numbers, and positions of the nodes of shapes are in the plan of the cell.
+    """
+
+    psd_height: Array  # shape (wave numbers,), in m³
+    height_density: Array  # shape (height bins,)
+    # Shape (2, penetrations, wave numbers), in m³, first axis loading and unloading
+    psd_displacement: Array
+    gap_density: Array  # shape (2, penetrations, gap bins)
+    # Shape (2, penetrations); number of realisations averaged in the last two
+    in_contact: NDArray[np.int64]
+    # Of the first finished realisation whose fields are stored
+    shape: DeformedShape | None
+
+
+def average_fields(
+    results: Results, rows: NDArray[np.intp], kept: NDArray[np.intp]
+) -> FieldStatistics:
+    """Average the rows of a cell; ``kept`` are the rows of the file that keep their fields."""
+    averages = {name: _average(results, name, rows) for name in _AVERAGED}
+    slots = np.flatnonzero(np.isin(kept, rows))[:1]
+    shape = [results.column(name, slots).astype(float) for name in _OF_SHAPE]
+    return FieldStatistics(
+        in_contact=averages["psd_displacement"][1],
+        shape=DeformedShape(*(values[0] for values in shape)) if slots.size else None,
+        **{name: mean for name, (mean, _) in averages.items()},
+    )
+
+
+def fitted_slope(plan: FieldPlan, density: Array) -> tuple[float, float]:
+    """Fit a power law to a spectrum at small wave numbers: exponent and its standard error.
+
+    Least squares in the logarithms over the lowest decade of the profile's spectrum (over its lower
+    half if it is shorter than two decades). NaN if fewer than three bins lie there.
+    """
+    wave_number = plan.wave_number
+    profile = plan.campaign.profile
+    lowest = profile.n0 * 2 * np.pi / plan.period
+    span = min(10.0, float(np.sqrt(profile.ratio)))
+    chosen = plan.filled & (wave_number <= lowest * span) & (density > 0)
+    if np.sum(chosen) < 3:
+        return float("nan"), float("nan")
+    x, y = np.log(wave_number[chosen]), np.log(density[chosen])
+    x = x - x.mean()
+    slope = float(x @ y / (x @ x))
+    residual = y - y.mean() - slope * x
+    return slope, float(np.sqrt(residual @ residual / max(1, x.size - 2) / (x @ x)))
+
+
+def _average(
+    results: Results, name: str, rows: NDArray[np.intp]
+) -> tuple[Array, NDArray[np.int64]]:
+    """Average the rows that hold finite numbers; return mean and count.
+
+    The count has the shape of the mean without its last axis.
+    """
+    shape = results.column(name, slice(0, 1)).shape[1:]
+    total, count = np.zeros(shape), np.zeros(shape[:-1], dtype=np.int64)
+    for block in _blocks(rows.size, int(np.prod(shape)), READ_AT_ONCE):
+        values = results.column(name, rows[block]).astype(float)
+        held = np.isfinite(values).all(axis=-1)
+        total += np.where(held[..., None], values, 0.0).sum(axis=0)
+        count += held.sum(axis=0)
+    with np.errstate(invalid="ignore"):
+        return total / count[..., None], count
+
+
+@dataclass(frozen=True, eq=False)
+class JumpStatistics:
+    """Jumps of all tasks of a cell together, by kind."""
+
+    number: NDArray[np.int64]  # shape (kinds,)
+    energy: Array  # shape (kinds,); their drops, J/m² of nominal area
+    # Shape (kinds, bins); number of jumps by energy drop, between :data:`BIN_EDGES`
+    histogram: NDArray[np.int64]
+    truncated: int  # number of tasks that made more jumps than the catalogue holds
+
+
+def count_jumps(results: Results, rows: NDArray[np.intp]) -> JumpStatistics:
+    """Count the jumps of the rows of a cell."""
+    slots, bins = results.campaign.output.jumps, BIN_EDGES.size - 1
+    number, energy = np.zeros(len(JUMP_KINDS), dtype=np.int64), np.zeros(len(JUMP_KINDS))
+    histogram = np.zeros((len(JUMP_KINDS), bins), dtype=np.int64)
+    for part in _blocks(rows.size, slots, READ_AT_ONCE):
+        block = rows[part]
+        flags = results.column("jump_kind", block)
+        used = flags >= 0
+        if results.campaign.cycle.under_load:
+            used &= results.column("jump_patches_after", block) > 0
+        kind = flags[used].astype(np.intp)
+        drop = results.column("jump_energy_drop", block)[used]
+        bin_of_drop = np.clip(np.searchsorted(BIN_EDGES, drop, side="right") - 1, 0, bins - 1)
+        np.add.at(number, kind, 1)
+        np.add.at(energy, kind, drop)
+        np.add.at(histogram, (kind, bin_of_drop), 1)
+    truncated = int(np.sum(results.column("jump_count", rows) > slots))
+    return JumpStatistics(number, energy, histogram, truncated)
+
+
+def _blocks(count: int, width: int, most: int) -> Iterator[slice]:
+    """Split so many rows or columns of ``width`` numbers: at most ``most`` numbers, or one line."""
+    step = max(1, most // max(1, width))
+    for start in range(0, count, step):
+        yield slice(start, start + step)
 
 
 @dataclass(frozen=True, eq=False)

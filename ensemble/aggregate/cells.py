@@ -1,18 +1,25 @@
-"""Read the cells of a campaign, one point on its axes each: values of finished tasks, and means."""
+"""Read the cells of a campaign, one point on its axes each, and compare those of two campaigns.
+
+The seed of a realisation's phases is the same in all cells of a campaign, and of campaigns that
+share their seed, so the difference of two losses is taken profile by profile: with another
+resolution, path or spectrum.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
-from typing import TypeVar
+from pathlib import Path
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.precision import Precision, precision
-from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.rules import shown
+from adhesis.ensemble.campaign.tables import Axis, Campaign, differing
 from adhesis.ensemble.campaign.tasks import name_at
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.interval import Estimate, estimates
@@ -38,6 +45,9 @@ _NOT_AVERAGED = (
 )
 # Numbers of tasks by their state, under the names of :class:`Cell`.
 COUNTS = {"done": DONE, "pending": PENDING, "failed": FAILED, "not_needed": NOT_NEEDED}
+Kind = Literal["resolution", "load steps", "other"]
+# Keys that choose tasks and outputs, and do not change a loop.
+_IGNORED = ("sweep.", "stop.", "output.", "solver.time_limit")
 # Energies that are also given per largest contact area, in J/m² of contact.
 _PER_CONTACT = {
     "loss_per_contact": "loss",
@@ -233,3 +243,83 @@ def stress_scale(campaign: Campaign, h_max: Array) -> Array:
     """Return the mean stress in Pa at σ~ = 1, for each h_max in m."""
     half_space = HalfSpace(campaign.material.young, campaign.material.poisson)
     return np.asarray(problem.stress_scale(half_space, campaign.profile.period, h_max))
+
+
+@dataclass(frozen=True, eq=False)
+class Companion:
+    """Campaign that is compared with the reported one."""
+
+    path: Path
+    campaign: Campaign
+    cells: tuple[Cell, ...]
+    # "key = value" of the keys that differ, with the values of this campaign
+    differs: tuple[str, ...]
+    # Subject of the difference: "resolution" (the solver), "load steps", "other"
+    kind: Kind
+    further: tuple[Axis, ...] = ()  # axes beside H and γ of the reported campaign
+    doubts: tuple[str, ...] = ()  # sentences on damage of the file
+
+    def like(self, cell: Cell) -> Cell | None:
+        """Return the cell of the same H, γ and values on the further axes of either campaign.
+
+        None if this campaign lacks it.
+        """
+        keys = {axis.key for axis in (*self.campaign.axes[2:], *self.further)}
+
+        def point(of: Cell) -> tuple[Any, ...]:
+            return (of.hurst, of.work_of_adhesion, *(of.campaign.value(key) for key in keys))
+
+        return next((other for other in self.cells if point(other) == point(cell)), None)
+
+
+@dataclass(frozen=True)
+class LossDifference:
+    """A loss of two cells, over the realisations of the same phases that both have finished."""
+
+    here: Estimate
+    there: Estimate
+    difference: Estimate  # there less here
+
+
+def read_companion(path: Path | str, campaign: Campaign) -> Companion:
+    """Read another results file and the keys in which its campaign differs (InputError)."""
+    with Results(path) as results:
+        other, cells = results.campaign, finished_cells(results)
+        doubts = results.doubts()
+    values, keys = other.values(), differing_keys(campaign, other)
+    return Companion(
+        path=Path(path),
+        campaign=other,
+        cells=tuple(cells),
+        differs=tuple(f"{key} = {shown(values[key])}" for key in keys),
+        kind=kind_of(keys),
+        further=campaign.axes[2:],
+        doubts=doubts,
+    )
+
+
+def differing_keys(here: Campaign, there: Campaign) -> list[str]:
+    """Return the keys ("cycle.load_steps") in which the loops of two campaigns differ."""
+    return [key for key in differing(here, there) if not key.startswith(_IGNORED)]
+
+
+def kind_of(keys: Sequence[str]) -> Kind:
+    """Classify a difference in these keys; see :class:`Companion`."""
+    if keys and all(key.startswith("solver.") for key in keys):
+        return "resolution"
+    if list(keys) == ["cycle.load_steps"]:
+        return "load steps"
+    return "other"
+
+
+def difference(
+    here: Cell, there: Cell | None, name: str = "loss_dimensionless"
+) -> LossDifference | None:
+    """Compare a loss profile by profile; None without a realisation that both have finished."""
+    if there is None:
+        return None
+    _, mine, theirs = np.intersect1d(here.seed, there.seed, assume_unique=True, return_indices=True)
+    if not mine.size:
+        return None
+    own, other = here.values[name][mine], there.values[name][theirs]
+    return LossDifference(*estimates(np.array([own, other, other - own])))

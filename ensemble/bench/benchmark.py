@@ -37,18 +37,10 @@ COLUMNS = (
     TableColumn("solutions", "measured.solutions", "solutions", lambda n: str(n or BLANK)),
     TableColumn("jumps", "measured.jumps"),
     TableColumn("patches", "measured.patches"),
-    TableColumn("reference_loss", "reference.loss"),
-    TableColumn("reference", "reference.text"),
+    TableColumn("reference_loss", lambda line: line.reference[0]),
+    TableColumn("reference", lambda line: line.reference[1]),
     TableColumn("note", "measured.note", "note", only_if_any=True),
 )
-
-
-@dataclass(frozen=True)
-class Reference:
-    """Loss to which errors refer, in J/m², and its origin."""
-
-    loss: float
-    text: str
 
 
 @dataclass(frozen=True)
@@ -56,13 +48,13 @@ class Line:
     """One line of the table."""
 
     run: Run
-    reference: Reference
+    reference: tuple[float, str]  # loss to which errors refer, in J/m², and its origin
     measured: Measurement
 
     @property
     def error(self) -> float:
         """(loss - reference) / reference."""
-        return self.measured.loss / self.reference.loss - 1
+        return self.measured.loss / self.reference[0] - 1
 
 
 def benchmark(scenes: Sequence[Scene], *, seconds: float) -> Iterator[Line]:
@@ -85,17 +77,16 @@ def benchmark(scenes: Sequence[Scene], *, seconds: float) -> Iterator[Line]:
             yield Line(run, reference, measure(run))
 
 
-def _reference(scene: Scene, seconds: float) -> Reference:
+def _reference(scene: Scene, seconds: float) -> tuple[float, str]:
     if scene.exact_loss is not None:
-        return Reference(scene.exact_loss, "closed form")
+        return scene.exact_loss, "closed form"
     for accuracy in scene.tightest:
         limit = _REFERENCE_LIMIT * seconds
         run = Run(scene, "sharp", accuracy, scene.reference_load_steps, limit)
         loss = measure(run).loss
         if math.isfinite(loss):
-            text = f"sharp, accuracy {run.described}, {run.load_steps} load steps"
-            return Reference(loss, text)
-    return Reference(math.nan, "none: no reference run finished")
+            return loss, f"sharp, accuracy {run.described}, {run.load_steps} load steps"
+    return math.nan, "none: no reference run finished"
 
 
 def page(lines: Sequence[Line], made_by: str) -> str:
@@ -106,7 +97,7 @@ def page(lines: Sequence[Line], made_by: str) -> str:
         parts += [
             f"### {scene.title[0].upper()}{scene.title[1:]}",
             f"Δ~max = {scene.max_penetration:g}, {scene.load_steps} load steps. "
-            f"Reference: {chosen[0].reference.text}.",
+            f"Reference: {chosen[0].reference[1]}.",
             make_table("", COLUMNS, chosen).markdown(),
         ]
     return "\n\n".join(parts) + "\n"

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from adhesis.ensemble.campaign.rules import list_of, number_in, shown
-from adhesis.ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
+from adhesis.ensemble.campaign.tables import KEYS, TABLES, Campaign, SweepTable, Table
 from adhesis.ensemble.errors import InputError, quoted
 from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver.checks import MAX_PENETRATION, MOST_WAVES, at_least
@@ -168,11 +168,14 @@ def _read_table(name: Table, entries: object, lists: dict[str, tuple[float, ...]
             values[key] = metadata["rule"](where, value)
     for key, entry in known.items():
         if key not in values and entry.default is MISSING:
-            raise InputError(
-                f"[{name}] {key} is missing ({entry.metadata['meaning']}): "
-                f"it must be {entry.metadata['rule'].text}"
-            )
+            raise _missing(name, key)
     return kind(**values)
+
+
+def _missing(table: Table, name: str) -> InputError:
+    about = KEYS[f"{table}.{name}"].metadata
+    rule = f"it must be {about['rule'].text}"
+    return InputError(f"[{table}] {name} is missing ({about['meaning']}): {rule}")
 
 
 def _check_lists(campaign: Campaign, document: dict[str, Any]) -> None:
@@ -342,11 +345,7 @@ def _check_turning_point(campaign: Campaign) -> None:
     wanted = "max_stress" if cycle.under_load else "max_penetration"
     by_default = cycle.preload is not None and cycle.stiffness is None
     if getattr(cycle, wanted) is None and not by_default:
-        entry = next(f for f in fields(type(cycle)) if f.name == wanted)
-        raise InputError(
-            f"[cycle] {wanted} is missing ({entry.metadata['meaning']}): "
-            f"it must be {entry.metadata['rule'].text}"
-        )
+        raise _missing("cycle", wanted)
     if cycle.stiffness is None and not cycle.under_load:
         largest = campaign.in_cells("cycle.max_penetration")[-1][0] or cycle.deepest
         number_in(MAX_PENETRATION)(f"[cycle] {wanted}", largest)

@@ -1,7 +1,8 @@
 """The tables of a campaign: every key with its rule, its meaning and its default.
 
-Every key has one rule. What a campaign means is here; how its file is read is in
-:mod:`adhesis.ensemble.campaign.file`.
+Every key has one rule. What a campaign means is here, and by what two differ: order, comments and
+the spelling of numbers do not matter, and neither do the few keys that cannot change a result. How
+its file is read is in :mod:`adhesis.ensemble.campaign.file`.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.campaign.rules import Rule, choice, list_of, list_of_names, number_in
+from adhesis.ensemble.campaign.rules import Rule, choice, list_of, list_of_names, number_in, shown
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
+from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.quantities import HEIGHT
 from adhesis.solver import checks
 from adhesis.solver.checks import Bounds
@@ -97,8 +99,7 @@ class MaterialTable:
     poisson: float = _axis(checks.POISSON, "Poisson's ratio ν", MISSING)
     adhesion_range: float | None = _axis(
         checks.ADHESION_RANGE,
-        "range δ of adhesion in m: surfaces touch at a gap of δ (method sharp alone); by default "
-        "zero",
+        "range δ of adhesion in m: surfaces attract each other from a gap of δ on; by default zero",
     )
     strength: float | None = _axis(checks.STRENGTH, "instead of it, the strength γ/δ in Pa")
     work_of_adhesion_open: float | None = _axis(
@@ -483,3 +484,53 @@ class Campaign:
         found = {key: self.value(key) for key in KEYS}
         found = {k: sorted(v) if type(v) is tuple else v for k, v in found.items()}
         return found | {axis.key: list(axis.values) for axis in self.axes}
+
+
+# ---------------------------------------------------------------------- two campaigns
+
+
+def differing(one: Campaign, two: Campaign) -> list[str]:
+    """Return the keys ("cycle.load_steps") whose values two campaigns do not share."""
+    mine, other = one.values(), two.values()
+    return [key for key in mine if mine[key] != other[key]]
+
+
+def growth(
+    path: object, old: Campaign, new: Campaign, here: object = "this campaign"
+) -> tuple[str, ...]:
+    """Return the keys by which the campaign of a results file grew.
+
+    Keys that cannot change a result are left out. InputError for another campaign, with both values
+    of each key that differs otherwise.
+    """
+    before, after = old.values(), new.values()
+    grown, other = [], []
+    cells = [{one.identity(task) for task in one.tasks().of_cells()} for one in (old, new)]
+    is_kept = cells[0] <= cells[1]
+    for key in differing(old, new):
+        was, value = before[key], after[key]
+        if KEYS[key].metadata["free"]:
+            continue
+        if _extends(key, was, value) and is_kept:
+            grown.append(key)
+        else:
+            here_there = ("not given" if v is None else shown(v) for v in (value, was))
+            other.append(f"{key} is {' here and '.join(here_there)} there")
+    if other:
+        keys = "; ".join(other)
+        raise InputError(f"{path} holds another campaign: {keys} (here: {here}, there: {path})")
+    return tuple(grown)
+
+
+def _extends(key: str, was: Any, now: Any) -> bool:
+    if key in ("sweep.realisations", "stop.most"):
+        return bool(now > was)
+    if key == "stop.relative_error":
+        return None not in (was, now) and bool(now < was)
+    if key not in ("sweep.hurst", "sweep.work_of_adhesion") and not KEYS[key].metadata["axis"]:
+        return False
+    # All turning points of a profile belong together: they do not become more.
+    if key in [f"cycle.{name}" for name in TURNING_POINTS]:
+        return False
+    fewer, more = (set(value) if isinstance(value, list) else {value} for value in (was, now))
+    return fewer < more

@@ -12,26 +12,24 @@ import platform
 import sys
 from pathlib import Path
 
-from adhesis.ensemble.command.parser import declare, within
+from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
 from adhesis.ensemble.reporter import bar
 
 _DEFAULT = Path("out/benchmark")
+_TO = f"directory for benchmark.csv, benchmark.md and the figure (default {_DEFAULT})"
 EXAMPLES = ("adhesis bench --quick", "adhesis bench --to out/benchmark --budget 60")
 _FILES = tuple(f"benchmark.{suffix}" for suffix in ("csv", "md", "png", "pdf"))
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of ``adhesis bench``."""
-    to = f"directory for benchmark.csv, benchmark.md and the figure (default {_DEFAULT})"
-    seconds = within(1e-9, 1e9, "a positive number of seconds")
-    budget = "CPU time after which a run is given up (default 360)"
-    declare(
-        parser,
-        ("--to DIR", Path, to, {"default": _DEFAULT}),
-        ("--quick", bool, "small scenes only, under a minute"),
-        ("--budget SECONDS", seconds, budget, {"default": 360.0}),
-    )
+OPTIONS = (
+    ("--to DIR", Path, _TO, {"default": _DEFAULT}),
+    ("--quick", bool, "small scenes only, under a minute"),
+    (
+        *("--budget SECONDS", within(1e-9, 1e9, "a positive number of seconds")),
+        *("CPU time after which a run is given up (default 360)", {"default": 360.0}),
+    ),
+)
 
 
 def execute(args: argparse.Namespace) -> None:

@@ -29,9 +29,7 @@ complete -o bashdefault -o default -F _adhesis adhesis
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("shell", metavar="SHELL", choices=_SHELLS, help=" or ".join(_SHELLS))
+OPTIONS = (("shell SHELL", None, " or ".join(_SHELLS), {"choices": _SHELLS}),)
 
 
 def execute(args: argparse.Namespace) -> None:

@@ -11,7 +11,6 @@ import os
 from dataclasses import asdict
 from pathlib import Path
 
-from adhesis.ensemble.command.parser import declare
 from adhesis.ensemble.doctor.examine import Diagnosis, examine
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
@@ -19,17 +18,15 @@ from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 EXAMPLES = ("adhesis doctor", "adhesis doctor --in /scratch/me --json")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
-    folder = (
+OPTIONS = (
+    ("--json", bool, "the findings as JSON on stdout"),
+    (
+        *("--in DIR", Path),
         "try parallel writing in DIR, on the file system of the campaign (default: a temporary "
-        "folder)"
-    )
-    declare(
-        parser,
-        ("--json", bool, "the findings as JSON on stdout"),
-        ("--in DIR", Path, folder, {"dest": "directory"}),
-    )
+        "folder)",
+        {"dest": "directory"},
+    ),
+)
 
 
 def execute(args: argparse.Namespace) -> int:

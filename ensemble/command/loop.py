@@ -3,30 +3,32 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from adhesis.ensemble.command import options
 from adhesis.ensemble.command.loop_arguments import H_RMS, N0, PERIOD, RATIO
+from adhesis.ensemble.command.options import in_options
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 from adhesis.ensemble.loop import record
-from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
 from adhesis.ensemble.loop.heights import heights_warning, read_heights
 from adhesis.ensemble.outputs import Writing, check_ending, check_outputs, whole_file, write_json
-from adhesis.ensemble.trace import options
+from adhesis.ensemble.trace.loops import Cycle
 from adhesis.ensemble.versions import input_record, provenance
 from adhesis.solver import checks
 from adhesis.solver.checks import plain
+from adhesis.solver.loading.cycle import check_cycle, latest_turn
 from adhesis.solver.loading.loop import run_loop, run_loops
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.loop_state import field_nodes
-from adhesis.solver.loading.path import run_path
+from adhesis.solver.loading.path import check_path, run_path
 from adhesis.solver.method import Method, PathError
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
@@ -48,16 +50,12 @@ def execute(args: argparse.Namespace) -> int:
         profile, warnings, said = _profile(args)
         source = input_record(args.heights or args.trace)
         half_space = HalfSpace(args.young, args.poisson)
-        cycle = cycle_of(args, half_space)
-        problem = Problem(
-            *(profile, half_space, args.work_of_adhesion, cycle.control),
-            strength=math.inf if args.strength is None else args.strength,
-            adhesion_range=args.adhesion_range,
-            measure=args.measure,
-            work_of_adhesion_open=args.work_of_adhesion_open,
-            pattern=options.pattern_of(args),
-        )
-        cycle.check(problem)
+        gammas = (args.work_of_adhesion,)
+        cycle = Cycle(works_of_adhesion=gammas, **options.settings_of(args, half_space))
+        if args.path is None:
+            cycle = replace(cycle, turning_points=tuple(sorted(cycle.turning_points)))
+        problem = cycle.problem(profile, args.work_of_adhesion)
+        _check_cycle(args, cycle, problem)
     _check_film(args, cycle)
     wanted, at_stresses = _wanted_fields(args, cycle)
     with refused_as_input(vars(args)):
@@ -119,11 +117,23 @@ def execute(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace, method: Method, cycle: Cycle) -> tuple[record.Result, ...]:
     settings: dict[str, Any] = {"load_steps": cycle.load_steps, "progress": not args.quiet}
-    if cycle.is_path:
-        return (run_path(method, cycle.points, out=cycle.out, **settings),)
-    if len(cycle.points) > 1:
-        return run_loops(method, **cycle.arguments(cycle.points), **settings)
-    return (run_loop(method, **cycle.arguments(cycle.points[0]), **settings),)
+    turns = cycle.turning_points
+    if args.path is not None:
+        return (run_path(method, turns, out=options.ends_out(args.path), **settings),)
+    if len(turns) > 1:
+        return run_loops(method, **cycle.arguments(turns), **settings)
+    return (run_loop(method, **cycle.arguments(turns[0]), **settings),)
+
+
+def _check_cycle(args: argparse.Namespace, cycle: Cycle, problem: Problem) -> None:
+    """Check that the path can be followed; the ValueError gives the rule that it breaks."""
+    turns, steps = cycle.turning_points, cycle.load_steps
+    if args.path is not None:
+        check_path(turns, steps, problem, options.ends_out(args.path))
+        return
+    for turn in turns:
+        end = latest_turn(problem, turn, cycle.latest) if cycle.at_preload else turn
+        check_cycle(end, steps, cycle.control)
 
 
 def _take_defaults(args: argparse.Namespace) -> list[str]:
@@ -171,11 +181,11 @@ def _check_film(args: argparse.Namespace, cycle: Cycle) -> None:
     """Refuse a film that cannot be made, before the loop is run."""
     if args.film is None:
         return
-    if not cycle.is_path and len(cycle.points) > 1:
+    if args.path is None and len(cycle.turning_points) > 1:
         name = "--max-stress" if cycle.control.is_load else "--max-penetration"
-        name = "--preload" if cycle.are_preloads else name
+        name = "--preload" if cycle.at_preload else name
         raise InputError(
-            f"--film is given with {len(cycle.points)} turning points: a film shows one "
+            f"--film is given with {len(cycle.turning_points)} turning points: a film shows one "
             f"loop, so give {name} one value"
         )
     from adhesis.ensemble.loop.film import check_film
@@ -232,11 +242,11 @@ def _wanted_fields(args: argparse.Namespace, cycle: Cycle) -> tuple[list[float],
         for option in options.given(args, "field_penetrations", "field_stresses", "field_nodes"):
             raise InputError(f"{option} needs --fields, the file to which fields are written")
         return [], False
-    if cycle.is_path or len(cycle.points) > 1:
+    if args.path is not None or len(cycle.turning_points) > 1:
         raise InputError("--fields belongs to one loop: give one turning point, and no --path")
     penetrations, stresses = args.field_penetrations, args.field_stresses
     options.refuse_several(args, "field_penetrations", "field_stresses")
-    at_preload, (top,) = cycle.are_preloads, cycle.points
+    at_preload, (top,) = cycle.at_preload, cycle.turning_points
     at_stresses = stresses is not None or (at_preload and penetrations is None)
     if not at_stresses and (at_preload or not cycle.control.is_fixed):
         raise InputError(

@@ -8,6 +8,7 @@ that ``status`` and ``report`` never load MPI.
 from __future__ import annotations
 
 import importlib
+import io
 import os
 import resource
 import signal
@@ -18,10 +19,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from traceback import walk_stack
 from types import FrameType
+from typing import Any
 
 from adhesis.ensemble import errors, exit_codes
 from adhesis.ensemble.command.parser import Parser
-from adhesis.ensemble.command.streams import standard_streams
 from adhesis.ensemble.reporter import log
 from adhesis.ensemble.run.interrupt import in_main_thread
 from adhesis.ensemble.run.launch import ONE_THREAD
@@ -44,8 +45,8 @@ COMMANDS: dict[str, str] = {
 }
 EXAMPLES = ("adhesis loop --hurst 0.8 --seed 1", "adhesis run jobs/example.toml --ranks 3")
 _WITHOUT_NUMERICS = ("new", "completion")
-# Modules that declare options without loading the solver; those of other commands do so themselves.
-_OPTIONS = {"loop": "command.loop_arguments", "trace": "trace.trace_arguments"}
+# Their options are declared in modules of their own, without loading the solver.
+_OPTIONS = ("loop", "trace")
 # What several processes of a launcher do with a command: the ranks of `run` share its work, and
 # these are independent of one another (of other profiles, on other nodes). Rank 0 alone runs the
 # rest.
@@ -103,10 +104,9 @@ def _write_no_byte_code_under_a_limit() -> None:
 
 def parser_of(name: str) -> Parser:
     """Return the parser of a command."""
-    module = importlib.import_module(f"adhesis.ensemble.{_OPTIONS.get(name, f'command.{name}')}")
-    parser = Parser(f"adhesis {name}", module.__doc__ or "", module.EXAMPLES)
-    module.add_arguments(parser)
-    return parser
+    suffix = "_arguments" if name in _OPTIONS else ""
+    module = importlib.import_module(f"adhesis.ensemble.command.{name}{suffix}")
+    return Parser(f"adhesis {name}", module.__doc__ or "", module.EXAMPLES, module.OPTIONS)
 
 
 def _execute(name: str, words: Sequence[str]) -> int:
@@ -204,3 +204,74 @@ def _overview() -> Parser:
     parser.add_argument("--version", action="store_true", help="version and commit")
     parser.add_argument("command", metavar="COMMAND")
     return parser
+
+
+# ---------------------------------------------------------------------- stdout and stderr
+
+
+class _Output(io.FileIO):
+    """File descriptor of stdout or stderr: a message on stderr that cannot be written is lost.
+
+    The first failure of stdout raises, what follows is dropped. Otherwise the interpreter would try
+    to write the rest when it ends, and report that failure, too.
+    """
+
+    _failed = False
+
+    def write(self, data: Any, /) -> int:
+        try:
+            if not self._failed:
+                return super().write(data) or 0
+        except OSError as error:
+            self._failed = self.fileno() == 1
+            if isinstance(error, BrokenPipeError) and self._failed:
+                raise
+            if self._failed:
+                raise errors.WriteError(
+                    f"stdout could not be written: {errors.reason(error)}"
+                ) from None
+        return memoryview(data).nbytes
+
+
+@contextmanager
+def standard_streams() -> Iterator[None]:
+    """Replace the process's own stdout and stderr by safe ones, and open those that are closed.
+
+    Characters that the encoding lacks appear as escapes. A closed stdout fails when something is
+    printed. Streams that are not the process's own (of a notebook, of a test) stay as they are.
+    """
+    _open_closed_descriptors()
+    before = sys.stdout, sys.stderr
+    if sys.stdout is sys.__stdout__:
+        sys.stdout = _stream(sys.stdout, io.BufferedWriter(_Output(1, "w", closefd=False)))
+    if sys.stderr is sys.__stderr__:
+        sys.stderr = _stream(sys.stderr, io.BufferedWriter(_Output(2, "w", closefd=False)), True)
+    try:
+        yield
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(errors.WriteError, OSError, ValueError):
+                stream.flush()
+        sys.stdout, sys.stderr = before
+
+
+def _stream(like: Any, binary: io.BufferedWriter, by_line: bool = False) -> io.TextIOWrapper:
+    if like is not None:
+        like.flush()
+    return io.TextIOWrapper(
+        binary,
+        encoding="utf-8" if like is None else like.encoding,
+        errors="backslashreplace",
+        line_buffering=by_line or (like is not None and like.line_buffering),
+        write_through=like is not None and like.write_through,
+    )
+
+
+def _open_closed_descriptors() -> None:
+    """Occupy descriptors 0 to 2 where they are closed: a results file could become stdout."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            # The lowest free number is taken. Writing to a stdout that is read-only fails.
+            os.open(os.devnull, os.O_WRONLY if number == 2 else os.O_RDONLY)

@@ -9,20 +9,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adhesis.ensemble.command.parser import declare
 from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.reporter import log
 
 EXAMPLES = ("adhesis merge part1.h5 part2.h5 --out all.h5", "adhesis merge part3.h5 --out all.h5")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    declare(
-        parser,
-        ("parts PART.h5", Path, "results files of one campaign", {"nargs": "+"}),
-        ("--out FILE.h5", Path, "made, or merged into", {"required": True}),
-    )
+OPTIONS = (
+    ("parts PART.h5", Path, "results files of one campaign", {"nargs": "+"}),
+    ("--out FILE.h5", Path, "made, or merged into", {"required": True}),
+)
 
 
 def execute(args: argparse.Namespace) -> None:

@@ -14,9 +14,7 @@ from adhesis.ensemble.outputs import check_ending, write_new
 EXAMPLES = ("adhesis new my.toml", "adhesis new study/first.toml")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("file", type=Path, metavar="FILE.toml", help="the file to write")
+OPTIONS = (("file FILE.toml", Path, "the file to write"),)
 
 
 def execute(args: argparse.Namespace) -> None:

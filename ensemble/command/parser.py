@@ -17,7 +17,17 @@ _GIVEN = "_given"  # of a namespace: the options so far
 class Parser(argparse.ArgumentParser):
     """Parser of one command: raises InputError instead of printing the usage and exiting."""
 
-    def __init__(self, program: str, description: str, examples: Sequence[str]) -> None:
+    def __init__(
+        self,
+        program: str,
+        description: str,
+        examples: Sequence[str],
+        options: Sequence[str | tuple[Any, ...]] = (),
+    ) -> None:
+        """Declare options: name with its metavar ("--out FILE"), type, help, further settings.
+
+        The type of a flag is bool, that of a text None. A title begins a group of options.
+        """
         super().__init__(
             prog=program,
             description=description,
@@ -32,6 +42,16 @@ class Parser(argparse.ArgumentParser):
         whole = within(-math.inf, math.inf, "a whole number", int)
         for kind, convert in ((None, _text), (int, whole), (float, _number), (Path, _path)):
             self.register("type", kind, convert)
+        group: argparse._ActionsContainer = self
+        for option in options:
+            if isinstance(option, str):
+                group = self.add_argument_group(option)
+                continue
+            words, kind, text, *more = option
+            name, _, metavar = words.partition(" ")
+            of_kind = {"type": kind, "metavar": metavar or None}
+            settings = {"action": "store_true"} if kind is bool else of_kind
+            group.add_argument(name, help=text, **{**settings, **dict(*more)})
 
     def parse(self, words: Sequence[str]) -> argparse.Namespace:
         """Return the options; InputError for a bad one, SystemExit after ``--help``."""
@@ -63,18 +83,6 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raise an InputError that names the help."""
         raise InputError(f"{message} ({self.prog} --help lists the options)")
-
-
-def declare(group: argparse._ActionsContainer, *options: tuple[Any, ...]) -> None:
-    """Declare options: name with its metavar ("--out FILE"), type, help, and further settings.
-
-    The type of a flag is bool, that of a text None.
-    """
-    for words, kind, text, *more in options:
-        name, _, metavar = words.partition(" ")
-        of_kind = {"type": kind, "metavar": metavar or None}
-        settings = {"action": "store_true"} if kind is bool else of_kind
-        group.add_argument(name, help=text, **{**settings, **dict(*more)})
 
 
 class _StoreOnce(argparse._StoreAction):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adhesis.ensemble.command.parser import declare
 from adhesis.ensemble.outputs import check_output_folder
 from adhesis.ensemble.reporter import bar
 
@@ -17,19 +16,16 @@ _TABLES = ("losses", "precision", "growth", "jumps", "works", "beside", "slopes"
 _FILES = (*(f"{name}.csv" for name in _TABLES), "curves.nc", "report.md", "report.html")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
-    to = "directory for losses.csv, curves.nc, the figures, report.md and report.html"
-    beside = (
-        "other campaigns to compare with, loop by loop: another resolution or method, other load "
-        "steps, another largest penetration, another spectrum"
-    )
-    declare(
-        parser,
-        ("file FILE.h5", Path, "results file of a campaign"),
-        ("--to DIR", Path, to, {"required": True}),
-        ("--beside OTHER.h5", Path, beside, {"nargs": "+", "default": []}),
-    )
+_TO = "directory for losses.csv, curves.nc, the figures, report.md and report.html"
+_BESIDE = (
+    "other campaigns to compare with, loop by loop: another resolution or method, other load "
+    "steps, another largest penetration, another spectrum"
+)
+OPTIONS = (
+    ("file FILE.h5", Path, "results file of a campaign"),
+    ("--to DIR", Path, _TO, {"required": True}),
+    ("--beside OTHER.h5", Path, _BESIDE, {"nargs": "+", "default": []}),
+)
 
 
 def execute(args: argparse.Namespace) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from adhesis.ensemble import exit_codes
-from adhesis.ensemble.command.parser import declare, within
+from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.errors import InputError, WriteError, parameter
 from adhesis.ensemble.escape import shell_word
 from adhesis.ensemble.quantities import WORK_OF_ADHESION
@@ -25,8 +25,7 @@ from adhesis.ensemble.reporter import bar, log
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
     from adhesis.ensemble.campaign.tasks import Part
-    from adhesis.ensemble.run.progress import Summary
-    from adhesis.ensemble.run.session import Engine
+    from adhesis.ensemble.run.session import Engine, Summary
 
 _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
 _MOST = 2**31 - 1
@@ -35,35 +34,31 @@ _WHOLE = within(0, _MOST, "a whole number that is not negative", int)
 EXAMPLES = ("adhesis run jobs/example.toml --ranks 3", "adhesis run jobs/paper.toml --dry-run")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    ranks = "start N ranks on this machine (one more than cores is right: rank 0 only hands out)"
-    dry_run = "estimate the cost from about a minute of pilot loops, and write nothing"
-    part = "compute the K-th of N shares of the tasks into a file of its own (see adhesis merge)"
-    walltime = (
-        "stop in time for this walltime, as 3600, 1h30m or 12:00:00 "
-        "(default: what Slurm or Torque say)"
-    )
-    failures = "stop after so many failed tasks; 0: never (default: 20)"
-    redo = "compute tasks again: those that failed (failed), or done ones too (all)"
-    only, more = "with --redo: only", {"action": "append", "default": []}
-    gamma = f"{only} tasks of this γ in J/m²; may be repeated"
-    patience = "how long to wait for another run to let go of FILE.h5 (default: 10)"
-    declare(
-        parser,
-        ("campaign CAMPAIGN.toml", Path, "the campaign file"),
-        ("--out FILE.h5", Path, "results file (default: the campaign's name, here)"),
-        ("--ranks N", within(1, _MOST, "a whole number of at least 1", int), ranks),
-        ("--dry-run", bool, dry_run),
-        ("--part K/N", None, part),
-        ("--walltime TIME", None, walltime),
-        ("--max-failures N", _WHOLE, failures, {"default": 20}),
-        ("--redo WHICH", None, redo),
-        ("--hurst VALUE", _NUMBER, f"{only} tasks of this H; may be repeated", more),
-        ("--work-of-adhesion VALUE", WORK_OF_ADHESION.option, gamma, more),
-        ("--realisation VALUE", _WHOLE, f"{only} this realisation; may be repeated", more),
-        ("--patience SECONDS", _NUMBER, patience, {"default": 10.0}),
-    )
+_RANKS = "start N ranks on this machine (one more than cores is right: rank 0 only hands out)"
+_DRY_RUN = "estimate the cost from about a minute of pilot loops, and write nothing"
+_PART = "compute the K-th of N shares of the tasks into a file of its own (see adhesis merge)"
+_WALLTIME = (
+    "stop in time for this walltime, as 3600, 1h30m or 12:00:00 (default: what Slurm or Torque say)"
+)
+_FAILURES = "stop after so many failed tasks; 0: never (default: 20)"
+_REDO = "compute tasks again: those that failed (failed), or done ones too (all)"
+_ONLY, _MORE = "with --redo: only", {"action": "append", "default": []}
+_GAMMA = f"{_ONLY} tasks of this γ in J/m²; may be repeated"
+_PATIENCE = "how long to wait for another run to let go of FILE.h5 (default: 10)"
+OPTIONS = (
+    ("campaign CAMPAIGN.toml", Path, "the campaign file"),
+    ("--out FILE.h5", Path, "results file (default: the campaign's name, here)"),
+    ("--ranks N", within(1, _MOST, "a whole number of at least 1", int), _RANKS),
+    ("--dry-run", bool, _DRY_RUN),
+    ("--part K/N", None, _PART),
+    ("--walltime TIME", None, _WALLTIME),
+    ("--max-failures N", _WHOLE, _FAILURES, {"default": 20}),
+    ("--redo WHICH", None, _REDO),
+    ("--hurst VALUE", _NUMBER, f"{_ONLY} tasks of this H; may be repeated", _MORE),
+    ("--work-of-adhesion VALUE", WORK_OF_ADHESION.option, _GAMMA, _MORE),
+    ("--realisation VALUE", _WHOLE, f"{_ONLY} this realisation; may be repeated", _MORE),
+    ("--patience SECONDS", _NUMBER, _PATIENCE, {"default": 10.0}),
+)
 
 
 def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:

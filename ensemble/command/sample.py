@@ -15,9 +15,7 @@ EXAMPLES = ("adhesis sample trace.csv", "adhesis sample data/stylus.csv")
 _POINTS, _STEP = 1001, 1e-6  # m
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="the file to write, as .csv")
+OPTIONS = (("file FILE", Path, "the file to write, as .csv"),)
 
 
 def execute(args: argparse.Namespace) -> None:

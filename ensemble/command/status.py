@@ -10,23 +10,19 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-from adhesis.ensemble.command.parser import declare, within
+from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.errors import InputError
 
 EXAMPLES = ("adhesis status paper.h5", "adhesis status paper.h5 --watch --interval 10")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    seconds = within(0.1, 86_400, "a number of seconds between 0.1 and 86400")
-    interval = "with --watch: how often (default: 2)"
-    declare(
-        parser,
-        ("file FILE.h5", Path, "the results file"),
-        ("--json", bool, "everything, as JSON"),
-        ("--watch", bool, "repeat the status until all is done"),
-        ("--interval SECONDS", seconds, interval, {"default": 2.0}),
-    )
+_SECONDS = within(0.1, 86_400, "a number of seconds between 0.1 and 86400")
+OPTIONS = (
+    ("file FILE.h5", Path, "the results file"),
+    ("--json", bool, "everything, as JSON"),
+    ("--watch", bool, "repeat the status until all is done"),
+    ("--interval SECONDS", _SECONDS, "with --watch: how often (default: 2)", {"default": 2.0}),
+)
 
 
 def execute(args: argparse.Namespace) -> int:

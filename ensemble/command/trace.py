@@ -5,9 +5,14 @@ from __future__ import annotations
 import argparse
 import sys
 
+from adhesis.ensemble.command.options import (
+    in_options,
+    prepared_of,
+    settings_of,
+    what_was_read,
+)
 from adhesis.ensemble.errors import InputError, refused_as_input
 from adhesis.ensemble.exit_codes import SOME_FAILED
-from adhesis.ensemble.loop.cycle import control_of, in_options, turns_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
 from adhesis.ensemble.quantities import WORK_OF_ADHESION, read_list
 from adhesis.ensemble.trace.answer import (
@@ -19,7 +24,6 @@ from adhesis.ensemble.trace.answer import (
     make_cycle,
     run_plan,
 )
-from adhesis.ensemble.trace.options import pattern_of, prepared_of, what_was_read
 from adhesis.ensemble.trace.variants import make_plan
 from adhesis.ensemble.versions import input_record, provenance
 from adhesis.solver.model.half_space import HalfSpace
@@ -34,14 +38,8 @@ def execute(args: argparse.Namespace) -> int:
     gammas = read_list("--work-of-adhesion", args.work_of_adhesion, WORK_OF_ADHESION.read)
     with refused_as_input(vars(args), thickness="layer"):
         half_space = HalfSpace(args.young, args.poisson)
-        control = control_of(args, half_space)
-        turns = turns_of(args, control)
-        cycle = make_cycle(
-            half_space, gammas, turns.points, args.load_steps, args.method, args.accuracy, control,
-            args.adhesion_range, args.strength, at_preload=turns.are_preloads, latest=turns.latest,
-            work_of_adhesion_open=args.work_of_adhesion_open, measure=args.measure,
-            pattern=pattern_of(args),
-        )  # fmt: skip
+        settings = settings_of(args, half_space)
+        cycle = make_cycle(works_of_adhesion=gammas, **settings)
     if args.to is not None:
         check_output_folder("--to", args.to, FILES, {"the command": args.file})
     prepared = prepared_of(args, args.file)

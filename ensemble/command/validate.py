@@ -11,24 +11,20 @@ import sys
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from adhesis.ensemble.command.parser import declare
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 
 if TYPE_CHECKING:
     from adhesis.solver.validate.claims import Row
 
+_SEVERAL = {"action": "append"}
 EXAMPLES = ("adhesis validate", "adhesis validate --method sharp --json")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of ``adhesis validate``."""
-    method = "method to validate, may be repeated (default: all)"
-    declare(
-        parser,
-        ("--method NAME", None, method, {"action": "append"}),
-        ("--json", bool, "print the rows as JSON"),
-    )
+OPTIONS = (
+    ("--method NAME", None, "method to validate, may be repeated (default: all)", _SEVERAL),
+    ("--json", bool, "print the rows as JSON"),
+)
 
 
 def execute(args: argparse.Namespace) -> int:

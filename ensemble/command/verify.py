@@ -10,16 +10,15 @@ import argparse
 import json
 from pathlib import Path
 
-from adhesis.ensemble.command.parser import declare
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 
 EXAMPLES = ("adhesis verify paper.h5", "adhesis verify paper.h5 --json")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    rows = "counts, and every damaged row with its task, as JSON"
-    declare(parser, ("file FILE.h5", Path, "the results file"), ("--json", bool, rows))
+OPTIONS = (
+    ("file FILE.h5", Path, "the results file"),
+    ("--json", bool, "counts, and every damaged row with its task, as JSON"),
+)
 
 
 def execute(args: argparse.Namespace) -> int:

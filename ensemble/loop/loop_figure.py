@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 
 from adhesis.ensemble.loop.record import Result
 from adhesis.ensemble.report.figures import style
-from adhesis.ensemble.report.figures.curves import Curve, draw_curves, look_of_branch
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver.loading.loop_result import LoopResult
@@ -23,20 +22,20 @@ from adhesis.solver.model.profile import Profile
 def draw_loops(results: Sequence[Result], ax: object = None) -> Figure:
     """Draw loops of ascending turning points that share their loading branch, or one path.
 
-    ``ax`` is that of :func:`draw_curves`.
+    ``ax`` is that of :func:`adhesis.ensemble.report.figures.style.draw_curves`.
     """
-    return draw_curves(_curves_of(results), ax)
+    return style.draw_curves(_curves_of(results), ax)
 
 
-def _curves_of(results: Sequence[Result]) -> Iterator[Curve]:
+def _curves_of(results: Sequence[Result]) -> Iterator[style.Curve]:
     for k, result in enumerate(results):
         columns = result.columns()
         if isinstance(result, LoopResult):
             rows = result.states("unloading")
             label = f"unloading from {result.penetration[rows[0]]:.3g}"
-            yield columns, rows, look_of_branch("unloading", k) | {"label": label}
+            yield columns, rows, style.look_of_branch("unloading", k) | {"label": label}
             if result is results[-1]:
-                yield columns, result.states("loading"), look_of_branch("loading")
+                yield columns, result.states("loading"), style.look_of_branch("loading")
             continue
         for leg in range(int(result.leg.max()) + 1):
             chosen = result.leg == leg

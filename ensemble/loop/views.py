@@ -35,8 +35,7 @@ def film(
     progress: Callable[[int, int], None] | bool | None,
 ) -> Any:
     """Make a film, and write it where a path is given; see :meth:`adhesis.LoopResult.film`."""
-    from adhesis.ensemble.loop.film import Film, check_film
-    from adhesis.ensemble.loop.film_scenes import scenes_of
+    from adhesis.ensemble.loop.film import Film, check_film, scenes_of
 
     if path is not None:
         path = check_film("path", path)

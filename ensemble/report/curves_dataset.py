@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.aggregate.by_blocks import QUANTILES
+from adhesis.ensemble.aggregate.average import QUANTILES, Aggregate
 from adhesis.ensemble.escape import printable
 from adhesis.solver.method import BRANCHES
 

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
-from adhesis.ensemble.aggregate.cells import Cell, alike, doubtful_loops, precisions
-from adhesis.ensemble.aggregate.companions import difference
+from adhesis.ensemble.aggregate.cells import Cell, alike, difference, doubtful_loops, precisions
 from adhesis.ensemble.campaign.tables import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
 from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit
@@ -25,7 +24,7 @@ from adhesis.ensemble.report.further_axes import (
     state_sign,
     together,
 )
-from adhesis.ensemble.report.tables.loss_tables import extreme, inside_interval, off_the_paper
+from adhesis.ensemble.report.tables.campaign_tables import extreme, inside_interval, off_the_paper
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.doubt import (
     INSTEAD,

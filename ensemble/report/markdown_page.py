@@ -13,8 +13,7 @@ from adhesis.ensemble.report.figures.catalogue import Illustration
 from adhesis.ensemble.report.figures.shapes_and_spectra import beside_paper
 from adhesis.ensemble.report.figures.style import left_out
 from adhesis.ensemble.report.further_axes import from_to, shown_cells
-from adhesis.ensemble.report.tables import loss_tables
-from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
+from adhesis.ensemble.report.tables import campaign_tables
 from adhesis.ensemble.report.tables.table import Table
 from adhesis.solver.checks import counted
 
@@ -29,8 +28,8 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         items = figures.get(section, ())
         return [_shown(item, data, of_paper, item in numbered[:1]) for item in items]
 
-    losses = loss_tables.losses(data)
-    beside = loss_tables.beside_the_paper(data)
+    losses = campaign_tables.losses(data)
+    beside = campaign_tables.beside_the_paper(data)
     out = [
         f"# Hysteresis loops of {code_span(data.path.name)}",
         markdown(" ".join(findings.verdict(data))),
@@ -46,7 +45,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         "## Losses",
         losses.markdown(),
         losses.notes(),
-        *_table("### Precision of the mean (`[stop]`)", loss_tables.precision(data)),
+        *_table("### Precision of the mean (`[stop]`)", campaign_tables.precision(data)),
         *show("losses"),
         *(["### Along further axes", *show("axes")] if figures.get("axes") else []),
         *_table("## What agrees with the paper, and what does not", beside),
@@ -54,7 +53,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         _bullets(*findings.agreement(data)),
         *_table(
             "### Growth of the loss with γ, profile by profile",
-            loss_tables.paired(data),
+            campaign_tables.paired(data),
             "The same profiles serve every γ, so the growth is known better than from two "
             "independent sets of profiles.",
         ),
@@ -63,7 +62,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         out += [
             "## Beside other campaigns",
             "The same realisations of both campaigns, profile by profile.",
-            loss_tables.companions(data).markdown(),
+            campaign_tables.companions(data).markdown(),
         ]
     out += ["## Loops", *show("loops")]
     if figures.get("fields"):
@@ -72,7 +71,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
             *show("fields"),
             *_table(
                 "### Slope of the spectrum of the deformed surface on loading",
-                mechanism_tables.slopes(data, ("loading",)),
+                campaign_tables.slopes(data, ("loading",)),
                 "Power law fitted at small wave numbers: over the lowest decade of the profile's "
                 "spectrum, or its lower half if it is shorter than two decades; standard error "
                 "of the fit. Unloading: `slopes.csv`.",
@@ -87,18 +86,18 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         "A jump is *small scale* if edges only run inside existing patches (spreading, receding), "
         "and *large scale* if patches come or go (snap-in, merging, splitting, opening, vanishing, "
         f"pull-off).{fall if data.campaign.cycle.under_load else ''}",
-        mechanism_tables.mechanisms(data).markdown(),
+        campaign_tables.mechanisms(data).markdown(),
         *show("mechanisms"),
         "### Share of the drops by kind of the jump",
-        mechanism_tables.shares_by_kind(data).markdown(),
+        campaign_tables.shares_by_kind(data).markdown(),
         "Numbers of jumps: `jumps.csv`.",
         "## Approach and separation",
-        loss_tables.works(data).markdown(),
+        campaign_tables.works(data).markdown(),
         "Works per nominal area, and the same over the largest contact area of the loop: effective "
         "works of adhesion on approach and separation, and their difference. Full contact: its "
         "elastic energy, to be set beside γ. With intervals: `works.csv`.",
         "## Profiles",
-        loss_tables.profiles(data).markdown(),
+        campaign_tables.profiles(data).markdown(),
     ]
     rest = (text for text in findings.quality(data) if not text.startswith("WARNING"))
     if accuracy := _bullets(*rest):

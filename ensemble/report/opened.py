@@ -25,7 +25,7 @@ from adhesis.ensemble.escape import printable
 from adhesis.ensemble.quantities import with_units
 from adhesis.ensemble.report.curves_dataset import curves_dataset
 from adhesis.ensemble.report.html import picture_of, table_of
-from adhesis.ensemble.report.tables import loss_tables, mechanisms
+from adhesis.ensemble.report.tables import campaign_tables
 from adhesis.ensemble.report.tables.table import Table
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.read import Results
@@ -236,17 +236,17 @@ class CampaignResults:
     @cached_property
     def losses(self) -> pd.DataFrame:
         """``losses.csv``: mean losses with 95 % intervals and errors, one row for each cell."""
-        return _frame(loss_tables.losses(self.averages), self.axes[:-1])
+        return _frame(campaign_tables.losses(self.averages), self.axes[:-1])
 
     @cached_property
     def growth(self) -> pd.DataFrame:
         """``growth.csv``: growth of the loss from one γ to the next, on the same profiles."""
-        return _frame(loss_tables.paired(self.averages), ())
+        return _frame(campaign_tables.paired(self.averages), ())
 
     @cached_property
     def mechanisms(self) -> pd.DataFrame:
         """Jumps by kind, their number and share of the drops (``jumps.csv``)."""
-        return _frame(mechanisms.jumps(self.averages), (*self.axes[:-1], "kind"))
+        return _frame(campaign_tables.jumps(self.averages), (*self.axes[:-1], "kind"))
 
     @cached_property
     def jumps(self) -> pd.DataFrame:

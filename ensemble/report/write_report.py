@@ -54,19 +54,19 @@ def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], Non
     from adhesis.ensemble.report.figures.style import save, style
     from adhesis.ensemble.report.html import html_page
     from adhesis.ensemble.report.markdown_page import write_page
-    from adhesis.ensemble.report.tables import loss_tables, mechanisms
+    from adhesis.ensemble.report.tables import campaign_tables
 
     tables = {
-        "losses": loss_tables.losses(data),
-        "growth": loss_tables.paired(data),
-        "jumps": mechanisms.jumps(data),
-        "works": loss_tables.works(data),
-        "slopes": mechanisms.slopes(data),
+        "losses": campaign_tables.losses(data),
+        "growth": campaign_tables.paired(data),
+        "jumps": campaign_tables.jumps(data),
+        "works": campaign_tables.works(data),
+        "slopes": campaign_tables.slopes(data),
     }
-    if (known := loss_tables.precision(data)).rows:
+    if (known := campaign_tables.precision(data)).rows:
         tables["precision"] = known
     if data.companions:
-        tables["beside"] = loss_tables.companions(data)
+        tables["beside"] = campaign_tables.companions(data)
     for name, table in tables.items():
         table.write_csv(directory / f"{name}.csv")
     write_netcdf(directory / "curves.nc", curves_dataset(data))
@@ -85,9 +85,9 @@ def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], Non
 
 def _print_summary(data: Aggregate, directory: Path) -> None:
     from adhesis.ensemble.report import findings
-    from adhesis.ensemble.report.tables import loss_tables, mechanisms
+    from adhesis.ensemble.report.tables import campaign_tables
 
-    for make in (loss_tables.losses, loss_tables.precision, mechanisms.mechanisms):
+    for make in (campaign_tables.losses, campaign_tables.precision, campaign_tables.mechanisms):
         if (table := make(data)).rows:
             print(table, end="\n\n")
     for sentence in (

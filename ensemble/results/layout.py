@@ -25,9 +25,9 @@ from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.regular_file import irregular
 from adhesis.ensemble.results import schema
-from adhesis.ensemble.results.disk_file import opened
-from adhesis.ensemble.results.head import reserve_head, write_head
+from adhesis.ensemble.results.checksum import reserve_head, write_head
 from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.write import opened
 from adhesis.ensemble.task.dataset import KEPT, Dataset
 from adhesis.solver.runtime.uninterrupted import signals_held
 

@@ -17,8 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.campaign.compare import growth
-from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tables import Campaign, growth
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.layout import Source, create

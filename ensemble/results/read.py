@@ -19,8 +19,7 @@ from adhesis.ensemble.campaign.tasks import WHOLE, Part, Tasks
 from adhesis.ensemble.errors import InputError, lack, quoted
 from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.results import schema
-from adhesis.ensemble.results.checksum import empty_checksums, row_checksums
-from adhesis.ensemble.results.head import HEAD, check_head
+from adhesis.ensemble.results.checksum import HEAD, check_head, empty_checksums, row_checksums
 from adhesis.ensemble.task.dataset import KEPT, Dataset
 from adhesis.solver.checks import shown
 

@@ -13,8 +13,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.campaign.compare import growth
-from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.precision import Batches
+from adhesis.ensemble.campaign.tables import Campaign, growth
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.errors import InputError, parameter
 from adhesis.ensemble.quantities import bytes_text
@@ -22,7 +22,6 @@ from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.layout import Source, check_space, create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.write import Writer
-from adhesis.ensemble.run.batches import Batches
 from adhesis.ensemble.run.interrupt import Deadline
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.versions import versions

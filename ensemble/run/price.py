@@ -14,9 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.precision import fewest, looks
-from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tables import Campaign, growth
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.quantities import bytes_text, duration, percent
 from adhesis.ensemble.results.layout import rows_in

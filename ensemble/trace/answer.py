@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import parameter
-from adhesis.ensemble.quantities import length_text, with_error
+from adhesis.ensemble.outputs import check_output_folder, staged_folder, write_json
+from adhesis.ensemble.quantities import length_text, with_error, with_units
 from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.run.dispatch import Unresponsive
-from adhesis.ensemble.trace.loops import Cycle, Loops, Result, Run, Watch
-from adhesis.ensemble.trace.options import MAX_PENETRATION
+from adhesis.ensemble.trace.loops import MAX_PENETRATION, Cycle, Loops, Result, Run, Watch
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import TABLES, Plan, make_plan
 from adhesis.solver import checks
@@ -122,14 +122,6 @@ class Uncertain:
         return self.uncertainty / abs(self.value) if self.value else 0.0
 
 
-@dataclass(frozen=True)
-class Change:
-    """Change of the loss by one loop."""
-
-    run: Run
-    factor: float  # its loss over that of the loop with which it is compared; 0 if it loses nothing
-
-
 def _least(name: str, none: str = "") -> Any:
     """Return a property of an answer: the least of a range of adhesion in m."""
 
@@ -208,7 +200,12 @@ class Answer(ByValue):
         TypeError
             If ``folder`` is no path.
         """
-        return Path(_views().write_all(self, folder))
+        path = checks.path("folder", folder)
+        check_output_folder("folder", path, (), {})
+        with staged_folder(path, FIGURE_FILES) as staged:
+            _views().write_page(self, staged)
+            write_json(staged / "trace.json", document(self))
+        return path / "trace.html"
 
     def to_dataframe(self) -> Any:
         """Return the numbers of every loop, that of the answer and the others.
@@ -219,7 +216,11 @@ class Answer(ByValue):
             A row for each loop; ``group`` is the doubt or the table that it belongs to.
             ``attrs["units"]`` holds the unit of every column.
         """
-        return _views().table_of_runs(self)
+        import pandas as pd
+
+        rows = pd.DataFrame(run_rows(self)).rename(columns={"said": "description"})
+        rows = rows.drop(columns=["preload_warnings", "warnings", "failed"], errors="ignore")
+        return with_units(rows, self.cycle.control.is_load)
 
     def result(self, name: str) -> Result | None:
         """Numbers of a loop, or None if it failed or was not run."""
@@ -249,22 +250,22 @@ class Answer(ByValue):
         return [one for one in found if one is not None]
 
     @property
-    def largest_changes(self) -> tuple[Change, ...]:
-        """The decision about the trace that changes the loss most.
+    def largest_changes(self) -> list[tuple[Run, float]]:
+        """The decision about the trace that changes the loss most, as its loop and a factor.
 
-        If it is a longer cut-off, the one of the other decisions that does so follows.
+        That is its loss over that of the loop with which it is compared; 0 if it loses nothing. If
+        it is a longer cut-off, the one of the other decisions that changes most follows.
         """
         changes = [
-            Change(run, max(1 + change, 0.0))
+            (run, max(1 + change, 0.0))
             for run in self.plan.runs
             if run.group not in ("answer", *TABLES)
             if (change := self.change(run.name)) is not None
         ]
-        changes.sort(key=lambda change: min(change.factor, 1 / (change.factor or math.inf)))
-        others = [change for change in changes[1:] if change.run.group != "cut-off"]
-        if changes and changes[0].run.group == "cut-off":
-            return (changes[0], *others[:1])
-        return tuple(changes[:1])
+        changes.sort(key=lambda change: min(change[1], 1 / (change[1] or math.inf)))
+        others = [change for change in changes[1:] if change[0].group != "cut-off"]
+        is_cut_off = bool(changes) and changes[0][0].group == "cut-off"
+        return changes[:1] + (others[:1] if is_cut_off else [])
 
     def group(self, name: str) -> list[tuple[Run, Result]]:
         """Loops of one doubt or table that came to their end, and their numbers."""
@@ -409,20 +410,14 @@ def loss_of_trace(
     return run_plan(prepared, cycle, plan, watch, checks.flag("progress", progress))
 
 
-def make_cycle(
-    half_space: HalfSpace,
-    work_of_adhesion: Several,
-    turning_points: Several,
-    *settings: Any,
-    **named: Any,
-) -> Cycle:
+def make_cycle(*settings: Any, **named: Any) -> Cycle:
     """Make contact and cycle, with the values of both tables (TypeError, ValueError).
 
-    The settings are the fields of a Cycle from ``load_steps`` on. A single γ is completed by half
-    and twice of it, a single turning point by one and two thirds.
+    The settings are the fields of a Cycle; works of adhesion and turning points may be numbers. A
+    single γ is completed by half and twice of it, a single turning point by one and two thirds.
     """
-    given = _several("work_of_adhesion", work_of_adhesion)
-    cycle = Cycle(half_space, given, (), *settings, **named)
+    cycle = Cycle(*settings, **named)
+    given = _several("work_of_adhesion", cycle.works_of_adhesion)
     checks.choice("method", cycle.method, METHOD_NAMES)
     checks.real("accuracy", cycle.accuracy, checks.ACCURACY)
     if cycle.work_of_adhesion_open is not None and len(given) > 1:
@@ -431,7 +426,7 @@ def make_cycle(
             "of adhesion: give one of each (in the table both keep their ratio)"
         )
     control, turning = cycle.control, cycle.turning.parameter
-    gammas, turns = given, _several(turning, turning_points)
+    gammas, turns = given, _several(turning, cycle.turning_points)
     if len(gammas) == 1 and 0 < gammas[0] < np.inf:
         gammas = (gammas[0], gammas[0] / 2, gammas[0] * 2)
     if len(turns) == 1:
@@ -677,7 +672,7 @@ def document(answer: Answer) -> dict[str, Any]:
             **{"processes": plan.processes, "hints": list(plan.hints)},
         },
         "largest_changes": [
-            {"name": change.run.name, "factor": change.factor} for change in answer.largest_changes
+            {"name": run.name, "factor": factor} for run, factor in answer.largest_changes
         ],
         "warnings": list(answer.warnings),
         "seconds": answer.seconds,

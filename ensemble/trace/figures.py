@@ -13,7 +13,6 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from adhesis.ensemble.quantities import shown_unit
 from adhesis.ensemble.report.figures import style
-from adhesis.ensemble.report.figures.curves import draw_curves, look_of_branch
 from adhesis.ensemble.trace.answer import FIGURES, Answer
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
@@ -129,7 +128,9 @@ def _spectrum(answer: Answer) -> tuple[Figure, str]:
 def draw_loop(answer: Answer) -> Figure:
     """Draw the answer's own loop."""
     states = {name: np.array(values) for name, values in answer.main["states"].items()}
-    return draw_curves((states, states["branch"] == b, look_of_branch(b)) for b in BRANCHES)
+    return style.draw_curves(
+        (states, states["branch"] == b, style.look_of_branch(b)) for b in BRANCHES
+    )
 
 
 def _loop(answer: Answer) -> tuple[Figure, str]:

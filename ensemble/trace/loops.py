@@ -27,6 +27,8 @@ from adhesis.solver.registry import MethodName, make_method
 Result = dict[str, Any]
 Watch = Callable[["Loops"], None]
 
+MAX_PENETRATION = 0.9
+"""Turning point Δ/h_max where none is given."""
 _REPORT_INTERVAL = 1.0  # s
 
 
@@ -49,7 +51,7 @@ _FAR_SIDE = Turning("max_penetration", "u_tot/h_max", "u", r"$u_\mathrm{tot}/h_{
 
 @dataclass(frozen=True)
 class Cycle:
-    """Contact and cycle in SI units; the answer has the first value of each tuple.
+    """Contact and cycle of loops in SI units; an answer has the first value of each tuple.
 
     Turning points are Δ/h_max, u_tot/h_max of a stiffness, or p̄ in Pa under a load; preloads in Pa
     if ``at_preload``, and ``latest`` is where a loop turns that does not reach its preload.
@@ -90,6 +92,10 @@ class Cycle:
         if self.control.is_load:
             return f"p̄ = {stress_text(point, 4)}"
         return f"{self.turning.sign} = {point:g}" + ("" if is_fixed else f" of {held}")
+
+    def arguments(self, turns: object) -> dict[str, Any]:
+        """Return the arguments of ``run_loop`` or ``run_loops`` for some of the turning points."""
+        return turn_arguments(self.control, turns, self.at_preload, self.latest)
 
     def problem(self, profile: Profile, work_of_adhesion: float) -> Problem:
         """Make the problem of a profile and a work of adhesion in J/m² (TypeError, ValueError).
@@ -135,7 +141,7 @@ def compute(run: Run, progress: Progress | None = None) -> Result:
     cycle = run.cycle
     problem = cycle.problem(run.profile, run.work_of_adhesion)
     method = make_method(cycle.method, problem, accuracy=cycle.accuracy)
-    turn = turn_arguments(cycle.control, run.turning_point, cycle.at_preload, cycle.latest)
+    turn = cycle.arguments(run.turning_point)
     loop = run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn)
     small, large = loop.drops(small_scale=True), loop.drops(small_scale=False)
     return loop.numbers() | {

@@ -3,37 +3,29 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from adhesis._version import __version__
 from adhesis.ensemble.escape import code_span, markdown, markdown_table, printable
-from adhesis.ensemble.outputs import check_output_folder, staged_folder, write_json
 from adhesis.ensemble.quantities import (
     length_text,
     rounded_percent,
     stress_text,
     with_error,
-    with_units,
 )
 from adhesis.ensemble.report.html import html_page, picture_of, table_of
 from adhesis.ensemble.trace.answer import (
     COVERAGE,
     DOUBTS,
-    FIGURE_FILES,
     FIGURES,
     LEAST,
     OF_MODEL,
     Answer,
     Uncertain,
-    document,
-    run_rows,
 )
 from adhesis.ensemble.trace.figures import draw_all, draw_loop
 from adhesis.ensemble.trace.variants import TABLES
-from adhesis.solver import checks
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.equilibrium_path import (
     friction_text,
@@ -104,14 +96,11 @@ def _largest_changes(answer: Answer) -> str:
     relative = answer.loss.relative
     low, high = max(1 - relative, 0.0), 1 + relative
     clauses: list[str] = []
-    for change in answer.largest_changes:
-        run = change.run
+    for run, factor in answer.largest_changes:
         against = "" if run.reference == "answer" else f", against “{run.reference}”"
         of = "of the other decisions " if clauses else "most "
-        beyond = "" if low <= change.factor <= high else ", beyond the interval"
-        clauses.append(
-            f"{of}by “{run.name}” ({run.description}{against}): × {change.factor:.3g}{beyond}"
-        )
+        beyond = "" if low <= factor <= high else ", beyond the interval"
+        clauses.append(f"{of}by “{run.name}” ({run.description}{against}): × {factor:.3g}{beyond}")
     return "; ".join(clauses) or "no other decision about the trace could be run"
 
 
@@ -151,29 +140,10 @@ def write_page(answer: Answer, folder: Path) -> None:
     (folder / "trace.html").write_text(html_page(text, folder), encoding="utf-8")
 
 
-def write_all(answer: Answer, folder: str | os.PathLike[str]) -> Path:
-    """Write the page, its figures and ``trace.json``; see the method ``page`` of an answer."""
-    path = checks.path("folder", folder)
-    check_output_folder("folder", path, (), {})
-    with staged_folder(path, FIGURE_FILES) as staged:
-        write_page(answer, staged)
-        write_json(staged / "trace.json", document(answer))
-    return path / "trace.html"
-
-
 def notebook_page(answer: Answer) -> str:
     """Return the summary of an answer and the figure of its loop as HTML."""
     rows = (line.split(maxsplit=1) for line in summary(answer).splitlines())
     return table_of((name, text) for name, text in rows) + picture_of(draw_loop(answer))
-
-
-def table_of_runs(answer: Answer) -> Any:
-    """Return the loops of an answer as a table; see its method ``to_dataframe``."""
-    import pandas as pd
-
-    rows = pd.DataFrame(run_rows(answer)).rename(columns={"said": "description"})
-    rows = rows.drop(columns=["preload_warnings", "warnings", "failed"], errors="ignore")
-    return with_units(rows, answer.cycle.control.is_load)
 
 
 # ---------------------------------------------------------------------- content

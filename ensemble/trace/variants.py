@@ -11,8 +11,7 @@ import numpy as np
 from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import duration, length_text
 from adhesis.ensemble.run.launch import cores
-from adhesis.ensemble.trace.loops import Cycle, Run
-from adhesis.ensemble.trace.options import MAX_PENETRATION
+from adhesis.ensemble.trace.loops import MAX_PENETRATION, Cycle, Run
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
 from adhesis.solver.checks import counted

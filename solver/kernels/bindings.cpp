@@ -169,11 +169,10 @@ using PythonAdhesionState = std::tuple<bool, double, double, WorkFunction, Integ
 void bind_model(nb::module_& m) {
   nb::class_<Panels>(m, "Panels")
       .def(nb::init<double, int, Vector, Vector, Vector, Vector, Vector, Vector, Pair, Pair,
-                    Integers, Vector, Vector, int, Vector, Vector, Vector, int>(),
+                    Integers, Vector, Vector, Vector, Vector, Vector, int>(),
            nb::kw_only(), "width"_a, "finest_count"_a, "x"_a, "w"_a, "stress"_a, "slope"_a,
            "tilt"_a, "pattern"_a, "half_plane"_a, "weights"_a, "level_start"_a, "end_x"_a,
-           "end_w"_a, "short_count"_a, "length_x"_a, "length_w"_a, "length_before"_a,
-           "highest_harmonic"_a)
+           "end_w"_a, "length_x"_a, "length_w"_a, "length_before"_a, "highest_harmonic"_a)
       .def(
           "stress",
           [](const Panels& p, const Vector& theta) {
@@ -280,20 +279,19 @@ void bind_field(nb::module_& m) {
       .def(
           "by_prescribed",
           [](const Field& f) {
-            if (f.solved[1].empty())
-              throw std::invalid_argument("solved in a known potential: it has no derivatives");
+            if (std::isnan(f.pressure)) throw std::invalid_argument("there is no field");
             const double rate = -2 * pi / f.resistance;
             Vector out = edge_openings(f.solved[1], f.nodes, f.equations, false);
             for (double& opening : out) opening *= -rate;
             return std::tuple(rate, -f.unit_mean * rate / (2 * pi), out);
           },
-          "Differentiate p, q0 s and C by d at fixed edges; ValueError if the potential was known.")
+          "Differentiate p, q0 s and C by d at fixed edges; ValueError if there is no field.")
       .def(
           "fine_opening",
           [](const Field& f, int k, double per_wave) {
             if (std::isnan(f.pressure)) throw std::invalid_argument("there is no field");
             const int count = count_sine_nodes(f, k, per_wave);
-            return rising(open_gap(f, k, Circle(count + 1)));
+            return rising(open_gap(f, k, *circle_of(count + 1)));
           },
           "k"_a, "per_wave"_a, Unlocked(),
           "Evaluate θ, T and the weight of ∫ T g dθ over T of a gap at fine nodes, and b_n.\n\n"
@@ -340,18 +338,10 @@ void bind_response(nb::module_& m) {
       .def_prop_ro("separation", [](const Equilibrium& e) { return e.at.separation; })
       .def_prop_ro("slope", [](const Equilibrium& e) { return e.at.slope; })
       .def_ro("pinned_share", &Equilibrium::pinned_share)
-      .def_ro("pinned_rate", &Equilibrium::pinned_rate)
-      .def(
-          "solve_field",
-          [](const Equilibrium& e, double prescribed, const FieldModel& model) {
-            return solve_separately(e.ends, e.references, e.orders, e.potential, e.at.pressure,
-                                    prescribed, model);
-          },
-          "prescribed"_a, "model"_a, Unlocked());
+      .def_ro("pinned_rate", &Equilibrium::pinned_rate);
   nb::enum_<DescentEvent>(m, "DescentEvent")
       .value("AT_REST", DescentEvent::at_rest)
       .value("VANISHED", DescentEvent::vanished)
-      .value("STEP_LIMIT", DescentEvent::step_limit)
       .value("NO_FIELD", DescentEvent::no_field);
   nb::class_<Descent>(m, "Descent")
       .def_ro("event", &Descent::event)
@@ -440,9 +430,9 @@ void bind_nucleation(nb::module_& m) {
 }
 
 void bind_predictor(nb::module_& m) {
-  nb::class_<FoldAhead>(m, "FoldAhead")
-      .def_ro("edge", &FoldAhead::edge)
-      .def_ro("distance", &FoldAhead::distance);
+  nb::class_<LeadingEdge>(m, "LeadingEdge")
+      .def_ro("edge", &LeadingEdge::edge)
+      .def_ro("fold_distance", &LeadingEdge::fold_distance);
   nb::class_<Predictor>(m, "Predictor")
       .def(nb::init<double, Vector, Vector, std::optional<std::tuple<double, Vector, Vector>>>(),
            "d"_a, "gaps"_a, "rate"_a, "before"_a.none(),
@@ -452,8 +442,8 @@ void bind_predictor(nb::module_& m) {
           "gaps", [](const Predictor& p) { return pairs_of(p.ends); }, new_array)
       .def_prop_ro("rate", [](const Predictor& p) { return p.rate; })
       .def_ro("way", &Predictor::way)
-      .def_ro("fold", &Predictor::fold)
-      .def("other_fold", &Predictor::other_fold)
+      .def_ro("leading", &Predictor::leading)
+      .def("other_leading", &Predictor::other_leading)
       .def(
           "predict_gaps",
           [](const Predictor& p, double at) { return pairs_of(p.predict_ends(at)); }, "at"_a)

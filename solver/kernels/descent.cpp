@@ -394,10 +394,7 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
       out.event = DescentEvent::vanished;
       break;
     }
-    if (largest(way) < rest_within(ends, law) && !(flow.is_at_limit || is_cut)) {
-      out.event = DescentEvent::at_rest;
-      break;
-    }
+    if (largest(way) < rest_within(ends, law) && !(flow.is_at_limit || is_cut)) break;
   }
   out.raced = law.critical > 0 && may_race(modelled, tangent, start, ends, law);
   out.ends = ends;

@@ -14,14 +14,13 @@
 namespace adhesis {
 
 enum class DescentEvent {
-  at_rest,     // the steps have become short: Newton's iteration finds the equilibrium
-  vanished,    // a gap or patch is below the smallest length
-  step_limit,  // the steps that were allowed are used up
-  no_field,    // the edges have no field
+  at_rest,   // steps have become short, for Newton's iteration, or those allowed are used up
+  vanished,  // a gap or patch is below the smallest length
+  no_field,  // the edges have no field
 };
 
 struct Descent {
-  DescentEvent event = DescentEvent::step_limit;
+  DescentEvent event = DescentEvent::at_rest;
   Vector ends;
   int steps = 0;  // solutions of the linear response
   // Whether the order in which the edges ran may have decided where they ended: some took so much

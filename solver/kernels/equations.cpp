@@ -5,9 +5,9 @@ namespace adhesis {
 namespace {
 
 // Subtract the first modes of a gap from the loads of its ends.
-EndTerms subtract_modes(const Vector& s, int modes, int load_count, const EndTerms& ends) {
+EndTerms subtract_modes(const Vector& s, int modes, const EndTerms& ends) {
   EndTerms out = {};
-  for (int which = 0; which < load_count; ++which) {
+  for (int which = 0; which < 2; ++which) {
     double low = 0, high = 0, sign = 1;
     for (int n = 0; n < modes; ++n) {
       high += s[which * modes + n];
@@ -84,17 +84,16 @@ Equations allocate_equations(const Nodes& nodes) {
           std::vector<EndTerms>(nodes.gap_count())};
 }
 
-WIDE void fill_gap(int k, int load_count, Nodes& nodes, Equations& equations,
-                   const FieldModel& model) {
+WIDE void fill_gap(int k, Nodes& nodes, Equations& equations, const FieldModel& model) {
   const GaussRule& rule = gauss_rules()[nodes.orders[k]];
   const int m = rule.count, first = nodes.offset[k];
   thread_local Vector s;
-  s.assign(m * load_count, 0.0);
+  s.assign(2 * m, 0.0);
   EndTerms ends = {};
-  gap_moments(nodes.gaps[k], *model.panels, m, load_count, s.data(), ends);
-  equations.end_terms[k] = subtract_modes(s, m, load_count, ends);
+  gap_moments(nodes.gaps[k], *model.panels, m, s.data(), ends);
+  equations.end_terms[k] = subtract_modes(s, m, ends);
   fill_nodes(k, rule, nodes);
-  for (int which = 0; which < load_count; ++which) {
+  for (int which = 0; which < 2; ++which) {
     double* load = (which == 0 ? equations.load : equations.load_of_slope).data() + first;
     apply(rule.modes.data(), m, m, &s[which * m], nullptr, load);
     for (int i = 0; i < m; ++i) load[i] *= rule.weights[i];

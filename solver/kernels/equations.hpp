@@ -37,14 +37,14 @@ using EndTerms = std::array<std::array<double, 2>, 2>;  // [side][load]
 // Diagonal blocks of B + G, flat, and loads; X is the weight of the nodes.
 struct Equations {
   Unset blocks;
-  Vector load, load_of_slope;       // S~, and S~' if asked for
+  Vector load, load_of_slope;       // S~ and S~'
   std::vector<EndTerms> end_terms;  // terms that the modes of S and S' above M add at the ends
 };
 
 Equations allocate_equations(const Nodes& nodes);
 
-// Fill in nodes, block and loads of gap k, of S alone or also of S'.
-void fill_gap(int k, int load_count, Nodes& nodes, Equations& equations, const FieldModel& model);
+// Fill in nodes, block and loads of gap k.
+void fill_gap(int k, Nodes& nodes, Equations& equations, const FieldModel& model);
 
 // Load on the own gap, and charges, of the singular opening that an edge leaves when it moves;
 // `density` is space for the nodes of the gap.

@@ -15,6 +15,23 @@ bool place_gap(LinearResponse& response, int k) {
   return invert_definite(&response.equations.blocks[square], m, &response.inverse[square]);
 }
 
+// Interpolate a potential g at θ from G = g dθ/dη at the nodes of a gap; beyond an end of the gap
+// it is the potential at that end.
+double interpolate_potential(const Gap& gap, const GaussRule& rule, const double* potential,
+                             double theta) {
+  MappedPoint at = eta_at(gap, std::min(std::max(theta, gap.end[0]), gap.end[1]));
+  double above = 0, below = 0, sign = 1;
+  for (int i = 0; i < rule.count; ++i) {
+    double apart = at.eta - rule.eta[i];
+    if (apart == 0) return at.slope * potential[i];
+    double share = sign * rule.weights[i] / apart;
+    above += share * potential[i];
+    below += share;
+    sign = -sign;
+  }
+  return at.slope * above / below;
+}
+
 // Move the reference of a gap, placed already, with the potential there; `old` is where it was,
 // with nodes of `old_rule`.
 void renew_gap(LinearResponse& response, int k, const Gap& old, const GaussRule& old_rule,
@@ -104,7 +121,7 @@ bool move_references(LinearResponse& response, const Vector& ends, const EdgeSta
     if (far[e / 2]) both.held[e] = true;
   hold_edges(response, ends, both);
   for (int k = 0; k < count; ++k)
-    if (changed[k] && has_room) fill_gap(k, 2, nodes, response.equations, model);
+    if (changed[k] && has_room) fill_gap(k, nodes, response.equations, model);
   bool renewed = has_room;
   for (int k = 0; k < count; ++k) {
     if (!(changed[k] && renewed)) continue;
@@ -162,7 +179,7 @@ std::optional<LinearResponse> set_up_response(const Vector& ends, double prescri
   LinearResponse out(Nodes(gaps, std::move(orders), ROOM), model.digits);
   const int count = out.gap_count();
   for (int k = 0; k < count; ++k) {
-    fill_gap(k, 2, out.nodes, out.equations, model);
+    fill_gap(k, out.nodes, out.equations, model);
     if (!place_gap(out, k)) return std::nullopt;
   }
   for (int run = count; run < out.tree.run_count(); ++run) out.tree.place_charges(run);
@@ -274,10 +291,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
     if (out.corrections >= MOST_CORRECTIONS) break;
     last = size;
   }
-  out.potential = response.potentials_at(pressure);
   response.is_lost = !out.found;
-  out.references = response.nodes.gaps;
-  out.orders = response.nodes.orders;
   out.ends = ends;
   if (out.found && law.pins()) share_openings(out, response, states.held, law, model);
   return out;

@@ -53,11 +53,8 @@ std::optional<LinearResponse> set_up_response(const Vector& ends, double prescri
 struct Equilibrium {
   bool found = false;  // whether one was found within reach, stable if strict
   Vector ends;
-  Vector potential;     // of the other gaps at the reference nodes, as G
   ResponseSolution at;  // its pressure is NaN if the edges have no field
   int corrections = 0;
-  std::vector<Gap> references;  // of the gaps, and the orders of their rules
-  Integers orders;
   // Place of C between both critical openings, 0 where an edge begins to advance and 1 where it
   // begins to recede, and its derivative by d; NaN for edges that are not pinned. Empty with one
   // work of adhesion.

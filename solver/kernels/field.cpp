@@ -76,7 +76,7 @@ Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
   const int n = nodes.size();
   const Unset inverse = unset(nodes.square.back());
   for (int k = 0; k < count; ++k) {
-    fill_gap(k, 1, field.nodes, field.equations, model);
+    fill_gap(k, field.nodes, field.equations, model);
     const int at = nodes.square[k];
     if (!invert_definite(&field.equations.blocks[at], nodes.size_of(k), &inverse[at])) return field;
   }
@@ -103,60 +103,6 @@ Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
     field.scaled_opening[i] = -field.solved[0][i] - field.pressure * field.solved[1][i];
   field.edge_opening = edge_openings(field.scaled_opening, nodes, field.equations, true);
   return field;
-}
-
-Field solve_separately(const Vector& ends, const std::vector<Gap>& known, const Integers& orders,
-                       const Vector& potential, double pressure, double prescribed,
-                       const FieldModel& model) {
-  const std::vector<GaussRule>& rules = gauss_rules();
-  Field field(model);
-  field.nodes = Nodes(map_gaps(ends), orders);
-  field.equations = allocate_equations(field.nodes);
-  const Nodes& nodes = field.nodes;
-  const int n = nodes.size();
-  Vector f(n), by_pressure(nodes.weight);
-  for (int k = 0; k < nodes.gap_count(); ++k) {
-    fill_gap(k, 1, field.nodes, field.equations, model);
-    const GaussRule& rule = rules[orders[k]];
-    const int m = rule.count, first = nodes.offset[k];
-    const double* block = &field.equations.blocks[nodes.square[k]];
-    Vector factor(block, block + m * m);
-    if (!factor_rows(factor.data(), m)) pressure = not_a_number;
-    std::copy_n(&nodes.weight[first], m, &by_pressure[first]);
-    solve_column(factor.data(), m, &by_pressure[first]);
-    for (int i = first; i < first + m; ++i) {
-      double there = interpolate_potential(known[k], rule, &potential[first], nodes.theta[i]);
-      f[i] = -(field.equations.load[i] + pressure * nodes.weight[i]) - nodes.weight[i] * there;
-    }
-    solve_column(factor.data(), m, &f[first]);
-  }
-  const double mean = dot(nodes.weight.data(), f.data(), n);  // mean opening times 2π
-  const double unit_mean = dot(nodes.weight.data(), by_pressure.data(), n);  // its fall by p
-  // weight·mean - 2π compliance·p = 2π d
-  auto [weight, compliance] = model.device;
-  double more = weight * mean - 2 * pi * (prescribed + compliance * pressure);
-  more /= weight * unit_mean + 2 * pi * compliance;
-  field.pressure = pressure + more;
-  add_scaled(-more, by_pressure.data(), f.data(), n);
-  field.separation = compliance != 0 ? (mean - more * unit_mean) / (2 * pi) : prescribed;
-  field.edge_opening = edge_openings(f, nodes, field.equations, true);
-  field.scaled_opening = f;
-  return field;
-}
-
-double interpolate_potential(const Gap& gap, const GaussRule& rule, const double* potential,
-                             double theta) {
-  MappedPoint at = eta_at(gap, std::min(std::max(theta, gap.end[0]), gap.end[1]));
-  double above = 0, below = 0, sign = 1;
-  for (int i = 0; i < rule.count; ++i) {
-    double apart = at.eta - rule.eta[i];
-    if (apart == 0) return at.slope * potential[i];
-    double share = sign * rule.weights[i] / apart;
-    above += share * potential[i];
-    below += share;
-    sign = -sign;
-  }
-  return at.slope * above / below;
 }
 
 }  // namespace adhesis

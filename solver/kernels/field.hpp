@@ -1,5 +1,4 @@
-// Elastic field of given gaps: equation (1) of gap_field.py, solved on the tree of gaps, or gap by
-// gap in a known potential of the others.
+// Elastic field of given gaps: equation (1) of gap_field.py, solved on the tree of gaps.
 #pragma once
 
 #include <optional>
@@ -12,7 +11,7 @@ struct Field {
   FieldModel model;
   Nodes nodes;
   Equations equations;
-  Pair solved;                       // (B + G)⁻¹ of S~ and of X; empty if the potential was known
+  Pair solved;                       // (B + G)⁻¹ of S~ and of X
   double unit_mean = not_a_number;   // Xᵀ (B + G)⁻¹ X
   double resistance = not_a_number;  // -2π/resistance is ∂p/∂d at fixed edges
   double pressure = not_a_number;    // p; NaN, as are all C, if there is no field
@@ -27,19 +26,8 @@ struct Field {
 Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
                   const FieldModel& model);
 
-// Solve every gap by itself in the potential of the others, G = g dθ/dη at the nodes of nearby
-// gaps. The pressure is corrected, so that d has the prescribed value to rounding.
-Field solve_separately(const Vector& ends, const std::vector<Gap>& known, const Integers& orders,
-                       const Vector& potential, double pressure, double prescribed,
-                       const FieldModel& model);
-
 // Evaluate C = sqrt(2 dη/dθ) f(±1) at every gap end, less the terms of higher modes if asked for.
 Vector edge_openings(const Vector& f, const Nodes& nodes, const Equations& equations,
                      bool with_end_terms);
-
-// Interpolate a potential g at θ from G = g dθ/dη at the nodes of a gap; beyond an end of the gap
-// it is the potential at that end.
-double interpolate_potential(const Gap& gap, const GaussRule& rule, const double* potential,
-                             double theta);
 
 }  // namespace adhesis

@@ -14,18 +14,16 @@ namespace adhesis {
 
 namespace {
 
-constexpr double largest_series = 0.36;  // z up to which artanh z is a short series
-constexpr double surely_smooth = 2.0;    // modes·length/distance of a panel that surely spans less
+constexpr double surely_smooth = 2.0;  // modes·length/distance of a panel that surely spans less
 
 // Nodes of the moments: 1 - η and 1 + η, and the weights times S and S'.
 struct MomentNodes {
   std::array<Vector, 2> from_end;  // 1 + η and 1 - η: η measured from the left and the right end
   std::array<Vector, 2> source;
-  int load_count, count;
+  int count;
 
   // Begin anew, with room for as many nodes.
-  void begin(int most, int of_loads) {
-    load_count = of_loads;
+  void begin(int most) {
     count = 0;
     for (auto* part : {&from_end, &source})
       for (Vector& values : *part) values.resize(std::max(values.size(), size_t(most)));
@@ -62,7 +60,6 @@ WIDE void place_end_piece(const Gap& gap, int side, double length, const Panels&
     double* nearer = &nodes.from_end[side][nodes.count];
     double* farther = &nodes.from_end[1 - side][nodes.count];
     double* weight = &nodes.source[0][nodes.count];
-    double known = 0, known_distance = 0;  // where the logarithm of the map is known
     if (first) {
       // the square root at the end becomes smooth in y
       for (int i = 0; i < rule; ++i) {
@@ -71,32 +68,19 @@ WIDE void place_end_piece(const Gap& gap, int side, double length, const Panels&
         weight[i] = 2 * y * panels.end_w[i] * stop;
       }
     } else {
-      known = 0.5 * (begin + stop);
-      const double half = 0.5 * (stop - begin);
-      known_distance = 0.5 * scale * log_ratio(known, poles);
+      const double middle = 0.5 * (begin + stop), half = 0.5 * (stop - begin);
       for (int i = 0; i < rule; ++i) {
-        r[i] = known + half * panels.x[i];
+        r[i] = middle + half * panels.x[i];
         weight[i] = half * panels.w[i];
       }
     }
-    const double a = poles.near + known, b = poles.far - known, d = stop - known;
-    if (d * (a + b) < largest_series * (2 * a * b + d * (b - a))) {
-      for (int i = 0; i < rule; ++i) {
-        double d = r[i] - known;
-        double z = d * (a + b) / (2 * a * b + d * (b - a));
-        nearer[i] = known_distance + scale * z * artanh_over(z * z);
-      }
-    } else {
-      for (int i = 0; i < rule; ++i) nearer[i] = 0.5 * scale * log_ratio(r[i], poles);
-    }
     for (int i = 0; i < rule; ++i) {
+      nearer[i] = 0.5 * scale * log_ratio(r[i], poles);
       farther[i] = 2 - nearer[i];
       position[i] = origin + per * r[i];
     }
-    if (nodes.load_count > 1) {
-      interpolate(panels.slope, position, rule, panels, value);
-      for (int i = 0; i < rule; ++i) nodes.source[1][nodes.count + i] = weight[i] * value[i];
-    }
+    interpolate(panels.slope, position, rule, panels, value);
+    for (int i = 0; i < rule; ++i) nodes.source[1][nodes.count + i] = weight[i] * value[i];
     interpolate(panels.stress, position, rule, panels, value);
     for (int i = 0; i < rule; ++i) weight[i] *= value[i];
     nodes.count += rule;
@@ -168,7 +152,7 @@ WIDE void place_tiles(const Gap& gap, const std::vector<Tile>& tiles, const Pane
       nearer[i] = distance + 2 * z * artanh_over(z * z) * scale;
     }
     for (int i = 0; i < p; ++i) farther[i] = 2 - nearer[i];
-    for (int which = 0; which < nodes.load_count; ++which) {
+    for (int which = 0; which < 2; ++which) {
       const double* weights = &panels.weights[which][tile.row * p];
       for (int i = 0; i < p; ++i) nodes.source[which][nodes.count + i] = weights[i];
     }
@@ -176,23 +160,24 @@ WIDE void place_tiles(const Gap& gap, const std::vector<Tile>& tiles, const Pane
   }
 }
 
-// Place Gauss-Chebyshev nodes of the first kind in η, which serve s_n and s^± alike.
-void place_short_gap(const Gap& gap, int modes, int load_count, const Panels& panels,
-                     MomentNodes& nodes) {
-  const ShortRule* rule = &panels.short_rule;
-  const int count = std::max(int(rule->eta.size()), 2 * modes);
-  ShortRule longer(count > int(rule->eta.size()) ? count : 0);
-  if (!longer.eta.empty()) rule = &longer;
-  nodes.begin(count + 4, load_count);
-  Vector theta(count), theta_by_t(count), value(count);
-  place_nodes(gap, rule->eta, rule->sine, theta.data(), theta_by_t.data());
+// Place Gauss-Chebyshev nodes of the first kind, η = cos t, which serve s_n and s^± alike.
+void place_short_gap(const Gap& gap, int modes, const Panels& panels, MomentNodes& nodes) {
+  const int count = std::max(3 * panels.nodes() + 6, 2 * modes);
+  nodes.begin(count + 4);
+  Vector cosine(count), sine(count), theta(count), theta_by_t(count), value(count);
   for (int i = 0; i < count; ++i) {
-    nodes.from_end[1][i] = rule->minus[i];
-    nodes.from_end[0][i] = rule->plus[i];
+    const double half = (i + 0.5) * pi / (2 * count), low = std::sin(half), high = std::cos(half);
+    nodes.from_end[1][i] = 2 * low * low;
+    nodes.from_end[0][i] = 2 * high * high;
+    cosine[i] = high * high - low * low;
+    sine[i] = 2 * low * high;
+  }
+  place_nodes(gap, cosine, sine, theta.data(), theta_by_t.data());
+  for (int i = 0; i < count; ++i) {
     theta[i] /= panels.width;
     theta_by_t[i] *= pi / count;
   }
-  for (int which = 0; which < load_count; ++which) {
+  for (int which = 0; which < 2; ++which) {
     interpolate(which == 0 ? panels.stress : panels.slope, theta.data(), count, panels,
                 value.data());
     for (int i = 0; i < count; ++i) nodes.source[which][i] = theta_by_t[i] * value[i];
@@ -200,17 +185,15 @@ void place_short_gap(const Gap& gap, int modes, int load_count, const Panels& pa
   nodes.count = count;
 }
 
-void place_moment_nodes(const Gap& gap, int modes, int load_count, const Panels& panels,
-                        MomentNodes& nodes) {
+void place_moment_nodes(const Gap& gap, int modes, const Panels& panels, MomentNodes& nodes) {
   const double width = panels.width;
   long first = long(std::floor(gap.end[0] / width)) + 2;  // end pieces are one to two panels long
   long last = long(std::ceil(gap.end[1] / width)) - 2;
-  if (last < first)
-    return place_short_gap(gap, modes, load_count, panels, nodes);  // they would meet
+  if (last < first) return place_short_gap(gap, modes, panels, nodes);  // they would meet
   thread_local std::vector<Tile> tiles;
   tile_gap(gap, first, last, modes, panels, tiles);
   const int most = most_end_nodes(gap, panels) + int(tiles.size()) * panels.nodes();
-  nodes.begin(most + 4, load_count);
+  nodes.begin(most + 4);
   place_end_piece(gap, 0, double(first) * width - gap.end[0], panels, nodes);
   place_end_piece(gap, 1, gap.end[1] - double(last) * width, panels, nodes);
   place_tiles(gap, tiles, panels, nodes);
@@ -220,16 +203,16 @@ void place_moment_nodes(const Gap& gap, int modes, int load_count, const Panels&
 
 }  // namespace
 
-WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, int load_count, double* s,
+WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, double* s,
                       std::array<std::array<double, 2>, 2>& ends) {
   thread_local MomentNodes nodes;  // kept, as gaps of many sizes follow each other
-  place_moment_nodes(gap, modes, load_count, panels, nodes);
+  place_moment_nodes(gap, modes, panels, nodes);
   for (; nodes.count % 4 != 0; ++nodes.count) {  // whole vectors, the last ones without weight
     nodes.from_end[0][nodes.count] = nodes.from_end[1][nodes.count] = 1;
-    for (int which = 0; which < load_count; ++which) nodes.source[which][nodes.count] = 0;
+    for (int which = 0; which < 2; ++which) nodes.source[which][nodes.count] = 0;
   }
   // sin((n+1)t), cos t = η, by its recurrence; four nodes at a time, for all modes
-  double total[8 * MOST_CHARGES];  // four of each load
+  double total[8 * MOST_CHARGES];  // four of either load
   std::fill_n(total, 8 * modes, 0.0);
   Four low[2] = {}, high[2] = {};
   for (int i = 0; i < nodes.count; i += 4) {
@@ -241,7 +224,7 @@ WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, int load_
       now[lane] = std::sqrt(product[lane]);
       twice[lane] = 2 * FromEnds{minus[lane], plus[lane]}.eta();
     }
-    for (int which = 0; which < load_count; ++which) {
+    for (int which = 0; which < 2; ++which) {
       source[which] = load_four(&nodes.source[which][i]);
       const Four share = source[which] / (now * pi);
       low[which] += share * minus;
@@ -250,13 +233,13 @@ WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, int load_
     for (int n = 0; n < modes; ++n) {
       double* sums = &total[8 * n];
       store_four(load_four(sums) + source[0] * now, sums);
-      if (load_count > 1) store_four(load_four(sums + 4) + source[1] * now, sums + 4);
+      store_four(load_four(sums + 4) + source[1] * now, sums + 4);
       const Four next = twice * now - previous;
       previous = now;
       now = next;
     }
   }
-  for (int which = 0; which < load_count; ++which) {
+  for (int which = 0; which < 2; ++which) {
     ends[0][which] = sum_lanes(low[which]);
     ends[1][which] = sum_lanes(high[which]);
     for (int n = 0; n < modes; ++n)

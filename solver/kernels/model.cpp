@@ -46,16 +46,6 @@ WIDE void interpolate(const Vector& coefficients, const double* position, int co
   }
 }
 
-ShortRule::ShortRule(int count) : minus(count), plus(count), eta(count), sine(count) {
-  for (int i = 0; i < count; ++i) {
-    double t = (i + 0.5) * pi / count;
-    minus[i] = 2 * std::sin(t / 2) * std::sin(t / 2);
-    plus[i] = 2 * std::cos(t / 2) * std::cos(t / 2);
-    eta[i] = std::cos(t);
-    sine[i] = std::sin(t);
-  }
-}
-
 ValueAndSlope measure_at(double theta, const Panels& panels) {
   auto [tilt, rate] = evaluate_series(panels.tilt, theta, panels);
   double measure = std::sqrt(1 + tilt * tilt);

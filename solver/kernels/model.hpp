@@ -7,13 +7,6 @@
 
 namespace adhesis {
 
-// Gauss-Chebyshev nodes of the first kind, η = cos t.
-struct ShortRule {
-  Vector minus, plus, eta, sine;  // 1 - η and 1 + η, to rounding, η, and sin t
-
-  ShortRule(int count);
-};
-
 // Rule on a finest panel from 0 to 1, and ∫ w dθ from 0 to the start of each panel.
 struct LengthRule {
   Vector nodes, weights, before;
@@ -31,7 +24,6 @@ struct Panels {
   std::array<Vector, 2> weights;     // ω for S and S' of every panel of every level
   Integers level_start;              // row of the weights at which each level starts
   Vector end_x, end_w;               // Gauss-Legendre rule on (0, 1) of an end piece
-  ShortRule short_rule;              // of a short gap, unless it needs more nodes
   LengthRule length;
   int highest_harmonic;  // of the profile
 
@@ -72,11 +64,11 @@ inline ValueAndSlope half_plane_opening(double theta, int side, const Panels& pa
   return evaluate_series(panels.half_plane[side], theta, panels);
 }
 
-// Compute the moments of S, with two loads also of S', over a gap; see gap_moments.cpp.
+// Compute the moments of S and S' over a gap; see gap_moments.cpp.
 //
 // `s` has a row for each load and a column for each mode, `ends` a value for both ends and each
 // load: ends[side][load].
-void gap_moments(const Gap& gap, const Panels& panels, int modes, int load_count, double* s,
+void gap_moments(const Gap& gap, const Panels& panels, int modes, double* s,
                  std::array<std::array<double, 2>, 2>& ends);
 
 }  // namespace adhesis

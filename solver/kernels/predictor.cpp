@@ -16,16 +16,11 @@ double led(double on, double way, const LeadingEdge& leading) {
   const double here = leading.here, fold = leading.fold;
   if (on * std::abs(way) >= leading.fold_distance) return fold;
   double low = 0, high = std::min(fold, 2 * on / here);
-  double lead = std::min(on / here, high);
   for (int i = 0; i < std::numeric_limits<double>::digits; ++i) {
-    const double value = polynomial(leading, lead) - on;
-    (value > 0 ? high : low) = lead;
-    const double slope = here + lead * (2 * leading.square + 3 * lead * leading.cube);
-    const double newton = slope > 0 ? lead - value / slope : infinity;
-    if (std::abs(newton - lead) < 1e-9 * high) break;
-    lead = low < newton && newton < high ? newton : 0.5 * (low + high);
+    const double middle = 0.5 * (low + high);
+    (polynomial(leading, middle) > on ? high : low) = middle;
   }
-  return lead;
+  return low;
 }
 
 }  // namespace
@@ -39,8 +34,7 @@ Predictor::Predictor(double d, Vector ends, Vector rate,
   if (rate_before_.size() != this->rate.size()) return;
   way = d - d_before;
   if (way == 0) return;
-  leading_ = find_leading_edge();
-  fold = {leading_.edge, leading_.fold_distance};
+  leading = find_leading_edge();
 }
 
 bool Predictor::may_lead(int edge) const { return std::abs(rate[edge]) > LEADING_SHARE * fastest; }
@@ -49,7 +43,7 @@ LeadingEdge Predictor::follow_edge(int edge) const {
   const double gone = (ends[edge] - ends_before_[edge]) * outwards(edge);
   const double before = gone / (way * rate_before_[edge]);
   const double here = gone / (way * rate[edge]);
-  LeadingEdge out = {edge, gone, not_a_number, not_a_number, not_a_number, infinity, infinity};
+  LeadingEdge out = {edge, gone};
   if (!(0 < before && before < infinity && 0 < here && here < infinity)) return out;
   out.here = here;
   out.square = 2 * here + before - 3;
@@ -78,24 +72,24 @@ LeadingEdge Predictor::follow_edge(int edge) const {
 LeadingEdge Predictor::find_leading_edge() const {
   int first = 0;
   while (std::abs(rate[first]) < fastest) ++first;
-  LeadingEdge leading = follow_edge(first);
+  LeadingEdge found = follow_edge(first);
   for (int edge = 0; edge < int(rate.size()); ++edge) {
     if (!may_lead(edge)) continue;
     const LeadingEdge other = follow_edge(edge);
-    if (other.fold_distance < leading.fold_distance) leading = other;
+    if (other.fold_distance < found.fold_distance) found = other;
   }
-  return leading;
+  return found;
 }
 
-FoldAhead Predictor::other_fold() const {
-  FoldAhead out;
-  if (fold.distance == infinity) return out;
+LeadingEdge Predictor::other_leading() const {
+  LeadingEdge out;
+  if (leading.fold_distance == infinity) return out;
   const int count = int(rate.size()) / 2;
   for (int edge = 0; edge < 2 * count; ++edge) {
-    const int apart = std::abs(edge / 2 - fold.edge / 2);
+    const int apart = std::abs(edge / 2 - leading.edge / 2);
     if (std::min(apart, count - apart) <= 1 || !may_lead(edge)) continue;
     const LeadingEdge other = follow_edge(edge);
-    if (other.fold_distance < out.distance) out = {edge, other.fold_distance};
+    if (other.fold_distance < out.fold_distance) out = other;
   }
   return out;
 }
@@ -107,10 +101,10 @@ Vector Predictor::predict_ends(double at) const {
     add_scaled(on, rate.data(), motion.data(), int(motion.size()));
     return move_edges(ends, motion);
   }
-  const double here_by = leading_.gone / rate[leading_.edge];
-  const double before_by = leading_.gone / rate_before_[leading_.edge];
-  const bool leads = !std::isnan(leading_.here);
-  const double lead = leads ? led(on / way, way, leading_) : 0;
+  const double here_by = leading.gone / rate[leading.edge];
+  const double before_by = leading.gone / rate_before_[leading.edge];
+  const bool leads = !std::isnan(leading.here);
+  const double lead = leads ? led(on / way, way, leading) : 0;
   for (int e = 0; e < int(ends.size()); ++e) {
     if (!leads) {
       motion[e] = rate[e] * on + (rate[e] - rate_before_[e]) * on * on / (2 * way);
@@ -130,14 +124,14 @@ Vector Predictor::predict_ends(double at) const {
 
 double Predictor::reach(double most, double resolution) const {
   const double straight = most / std::max(fastest, std::numeric_limits<double>::min());
-  if (fold.distance == infinity) return straight;
+  if (leading.fold_distance == infinity) return straight;
   // next to a fold: the step before it would be shorter than what is left before it
-  if (fold.distance < 0.7 * resolution) return across(fold.distance, resolution);
-  const double left = std::max(LEFT_BEFORE_FOLD * fold.distance, BEYOND_FOLD * resolution);
-  const double near = fold.distance - left;
-  const double lead = most / std::abs(leading_.gone);
-  if (!(lead < leading_.fold)) return near;
-  const double mean_slope = leading_.here + lead * (leading_.square + lead * leading_.cube);
+  if (leading.fold_distance < 0.7 * resolution) return across(leading.fold_distance, resolution);
+  const double left = std::max(LEFT_BEFORE_FOLD * leading.fold_distance, BEYOND_FOLD * resolution);
+  const double near = leading.fold_distance - left;
+  const double lead = most / std::abs(leading.gone);
+  if (!(lead < leading.fold)) return near;
+  const double mean_slope = leading.here + lead * (leading.square + lead * leading.cube);
   return std::min(std::abs(way) * lead * mean_slope, near);
 }
 

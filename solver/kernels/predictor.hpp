@@ -14,21 +14,16 @@
 
 namespace adhesis {
 
-// An edge that may lead, and d along its motion.
+// An edge that may lead, -1 for none, and d along its motion.
 //
 // d is a polynomial of how far the edge goes on, both in units of their ways between the points:
 // here·λ + square·λ² + cube·λ³; NaN if it does not lead.
 struct LeadingEdge {
-  int edge;
-  double gone;  // how far it has gone between the points
-  double here, square, cube;
-  double fold, fold_distance;  // where the polynomial has its extremum, and that distance in d
-};
-
-// A fold ahead: the edge that leads to it, -1 for none, and its distance in d.
-struct FoldAhead {
   int edge = -1;
-  double distance = infinity;
+  double gone = 0;  // how far it has gone between the points
+  double here = not_a_number, square = not_a_number, cube = not_a_number;
+  // where the polynomial has its extremum, and that distance in d: of the fold ahead
+  double fold = infinity, fold_distance = infinity;
 };
 
 // Predict a branch beyond a point and the one before it; beyond one alone it is straight.
@@ -38,15 +33,15 @@ class Predictor {
   const Vector ends, rate;  // at the point; rates are dn/dd
   double fastest;           // largest |dn/dd| of an edge there
   double way = 0;           // in d from the point before; 0 if that is not known
-  FoldAhead fold;           // that is seen ahead; its edge is the one that leads
+  LeadingEdge leading;
 
   // `before` are d, rates and ends at the point before; of another number of edges it serves not.
   Predictor(double d, Vector ends, Vector rate,
             std::optional<std::tuple<double, Vector, Vector>> before);
 
-  // Find the nearest fold ahead that other gaps lead to than the leading edge's and those beside
-  // it; at infinity if none is seen.
-  FoldAhead other_fold() const;
+  // Find the edge of the nearest fold ahead that other gaps lead to than the leading edge's and
+  // those beside it.
+  LeadingEdge other_leading() const;
 
   // Predict the ends at d.
   Vector predict_ends(double at) const;
@@ -60,7 +55,6 @@ class Predictor {
 
  private:
   Vector ends_before_, rate_before_;
-  LeadingEdge leading_ = {};
 
   LeadingEdge follow_edge(int edge) const;  // take d as a polynomial of its motion
   LeadingEdge find_leading_edge() const;

@@ -292,14 +292,6 @@ double LinearResponse::pressure_at(double prescribed, const LoadingDevice& devic
   return (2 * pi * prescribed - by_separation) / prescribed_by_pressure(device);
 }
 
-Vector LinearResponse::potentials_at(double pressure) const {
-  Vector out;
-  for (int k = 0; k < gap_count(); ++k)
-    for (int i = nodes.offset[k], end = i + nodes.size_of(k); i < end; ++i)
-      out.push_back(potential_at(i, pressure));
-  return out;
-}
-
 Vector LinearResponse::motion_to(const Vector& ends) const {
   Vector motion(ends.size());
   for (int e = 0; e < int(ends.size()); ++e)

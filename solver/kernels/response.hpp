@@ -92,11 +92,10 @@ struct LinearResponse {
   // p with d prescribed, by the mean openings of the last solution.
   double pressure_at(double prescribed, const LoadingDevice& device) const;
 
-  // Potentials of the last solution at p: at a node, and at those of all gaps.
+  // Potential of the last solution at a node and p.
   double potential_at(int node, double pressure) const {
     return potential[0][node] + pressure * potential[1][node];
   }
-  Vector potentials_at(double pressure) const;
 
   // Motion of all edges outwards from their references to these.
   Vector motion_to(const Vector& ends) const;

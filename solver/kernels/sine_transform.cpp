@@ -88,35 +88,14 @@ void transform(Complex& x, Complex& other, const Circle& circle) {
 }  // namespace
 
 Circle::Circle(int count) : count(count), cosine(2 * count), sine(2 * count) {
-  constexpr int rotations = 64;  // before a cosine is computed anew, so that rounding stays small
-  const double turn = pi / count, c1 = std::cos(turn), s1 = std::sin(turn);
-  const int half = count / 2;
-  double c = 1, s = 0;
-  for (int j = 0; j <= half; ++j) {
-    if (j % rotations == 0) {
-      c = std::cos(turn * j);
-      s = std::sin(turn * j);
-    }
-    cosine[j] = c;
-    sine[j] = s;
-    const double next = c * c1 - s * s1;
-    s = s * c1 + c * s1;
-    c = next;
-  }
-  cosine[half] = 0;
-  sine[half] = 1;
-  for (int j = half + 1; j <= count; ++j) {
-    cosine[j] = -cosine[count - j];
-    sine[j] = sine[count - j];
-  }
-  for (int j = count + 1; j < 2 * count; ++j) {
-    cosine[j] = cosine[2 * count - j];
-    sine[j] = -sine[2 * count - j];
+  for (int j = 0; j < 2 * count; ++j) {
+    cosine[j] = std::cos(pi * j / count);
+    sine[j] = std::sin(pi * j / count);
   }
 }
 
 std::shared_ptr<const Circle> circle_of(int count) {
-  constexpr int most = 8192;
+  constexpr int most = 1 << 16;
   thread_local std::map<int, std::shared_ptr<const Circle>> kept;
   if (count > most) return std::make_shared<const Circle>(count);
   auto& circle = kept[count];

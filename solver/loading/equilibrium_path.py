@@ -116,7 +116,8 @@ class EquilibriumPath(ByValue, ResultViews):
         Largest local maximum of tension inside patches, and where it occurred; None if no patch
         has one (docs/zero-range.md).
     narrowest_length : float
-        Shortest length in m that decides where edges stand (``zero_range``).
+        Shortest length in m that decides where edges stand (``zero_range``); infinite where edges
+        have zones, of any length.
     turn_range : float
         Range of adhesion in m at which jumps that lie beyond a turning point, and would come before
         it, take a hundredth of the loss. Infinite if it is longer than the other three ranges, 0 if
@@ -460,13 +461,17 @@ class EquilibriumPath(ByValue, ResultViews):
         strength = self.problem.strength
         if math.isfinite(strength):
             largest = 0.0 if interior is None else interior.tension
-            zones = 100 * self.zone_error / (abs(self.lost) or 1.0)
-            return (
+            text = (
                 f"adhesion of a range of {length_text(self.problem.attraction_range)}: surfaces "
                 f"jump together from there on; largest tension inside patches "
-                f"{stress_text(largest)}, strength {stress_text(strength)}; "
-                f"{outside_text(*self.outer_ranges)}; zones at edges, left out, change the loss by "
-                f"about {float(f'{zones:.1g}'):g} %"
+                f"{stress_text(largest)}, strength {stress_text(strength)}"
+            )
+            if math.isinf(self.narrowest_length):
+                return f"{text}; {counted(self.openings, 'opening')}, zones at edges are followed"
+            zones = 100 * self.zone_error / (abs(self.lost) or 1.0)
+            return (
+                f"{text}; {outside_text(*self.outer_ranges)}; zones at edges, left out, change the "
+                f"loss by about {float(f'{zones:.1g}'):g} %"
             )
         inside = "no tension inside patches"
         if interior is not None:
@@ -611,7 +616,7 @@ def path_fields(record: Record, started: float) -> tuple[dict[str, Any], Ledger]
         "contact_states": tuple(record.states),
         "new_method": method.recipe,
         "interior": interior,
-        "narrowest_length": narrowest_length(problem, record),
+        "narrowest_length": math.inf if method.has_zones else narrowest_length(problem, record),
     }
     return fields, ledger
 
@@ -624,6 +629,8 @@ def with_turn_range(result: PathOrLoop, record: Record, started: float) -> PathO
     """
     problem = result.problem
     step = problem.prescribed(0.0) - problem.prescribed(record.axis.step)
+    if record.method.has_zones:
+        return replace(result, turn_range=math.inf)
     found = turn_range(record.method, record, step, result.lost, result.least_range)
     # A jump that comes by δ too late changes the loss by δ times its change of the mean stress.
     at_jumps = np.diff(result.separation) == 0

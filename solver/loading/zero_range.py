@@ -363,8 +363,8 @@ def range_warnings(
             share = "" if shares[least] == 1 else f"{shares[least]:.2g} of "
             out.append(
                 f"the range of adhesion, {1e9 * own:.3g} nm, is longer than {share}{least}, "
-                f"{1e9 * bounds[least]:.3g} nm: {_WHAT_A_LONGER_RANGE_DOES[least]}, which is not "
-                "in the model (docs/zero-range.md)"
+                f"{1e9 * bounds[least]:.3g} nm: {_WHAT_A_LONGER_RANGE_DOES[least]}, which the "
+                "method 'sharp' leaves out; take the method 'zones' (docs/zero-range.md)"
             )
         return out
     bounds = {"valid_range": range_, **bounds}

@@ -196,7 +196,6 @@ class EdgeMechanics:
             panels=source.panels,
         )
         self.count = Counters()
-        self._finer: tuple[Point, Field] | None = None
         self.forget()
 
     def law_at(self, memory: Array) -> EdgeLaw:
@@ -264,13 +263,6 @@ class EdgeMechanics:
         work = np.array([self.adhesion.work(end, False)[0] for end in ends[nearest]])
         return np.asarray(np.maximum(opening, 0.0) ** 2 / (self.critical**2 * work))
 
-    def solve_finer(self, point: Point) -> Field:
-        """Solve the field of a point more accurately than that of the path, and its derivatives."""
-        if self._finer is None or self._finer[0] is not point:
-            self._finer = point, self.solution(point.gaps, point.d, FIELD_ACCURACY)
-            check_definite(self._finer[1])
-        return self._finer[1]
-
     def fold_displacement(self, point: Point, step: float) -> float:
         """Estimate how far in d the error of the field displaces the end of a branch.
 
@@ -282,7 +274,8 @@ class EdgeMechanics:
         edges are in the places at which it softens. Where pinned edges begin to move in the step,
         the branch may end for one that runs then: at another d, if its opening is wrong.
         """
-        finer = self.solve_finer(point)
+        finer = self.solution(point.gaps, point.d, FIELD_ACCURACY)
+        check_definite(finer)
         change = finer.edge_opening - point.field.solution.edge_opening
         _, _, by_prescribed = finer.by_prescribed()  # ∂C/∂d at fixed edges
         left = point.field.edge_opening.ravel() * point.rate
@@ -355,10 +348,6 @@ class EdgeMechanics:
         return Point(d, self.field(point.gaps, d), point.rate, math.nan)
 
     def _point(self, prescribed: float, found: Equilibrium) -> Point:
-        gaps = found.gaps
-        nearly = found.pressure, found.separation
-        field = GapField(
-            self.source, gaps, prescribed, lambda: found.solve_field(prescribed, self.model), nearly
-        )
+        field = self.field(found.gaps, prescribed, (found.pressure, found.separation))
         pinned = PinnedEdges(found.pinned_share, found.pinned_rate) if self.adhesion.pins else None
         return Point(prescribed, field, found.rate, found.slope, pinned=pinned)

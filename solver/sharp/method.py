@@ -76,7 +76,7 @@ def check_range(problem: Problem) -> None:
         f"the method 'sharp' they must be at most {at_most(gamma / least, 3)} m and at least "
         f"{at_least(least, 3)} Pa for this profile, or Griffith's crack at the strength, "
         f"{crack:.3g} m long, exceeds a quarter of the shortest wave, and edges of zero range do "
-        "not describe it; the method 'zones' takes any range"
+        "not describe it; the method 'zones' takes longer ones"
     )
 
 
@@ -270,7 +270,7 @@ class SharpMethod(Method):
                     "without adhesion the method 'sharp' finds no first patches under a load, or "
                     "where a soft stiffness holds the solid; the method 'grid' does"
                 )
-            event = Event(self.states.detached(touch), d, gaps, start)
+            event = Event(self.detached(touch / self.q0), d, gaps, start)
             point = history.commit(self.jumps.compute(event, target.direction))
         else:
             gaps = state.internal.gaps

@@ -6,8 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from adhesis.ensemble.aggregate.average import aggregate
-from adhesis.ensemble.aggregate.by_blocks import BIN_EDGES, QUANTILES, SMALL, fitted_slope
+from adhesis.ensemble.aggregate.average import BIN_EDGES, QUANTILES, SMALL, aggregate, fitted_slope
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.interval import estimates, interval, interval_method, untransformed
@@ -94,9 +93,9 @@ def test_curves_are_the_means_of_the_raw_rows(file, hurst, gamma):
 def test_blocks_of_any_size_give_the_same_numbers(file, monkeypatch):
     whole = aggregate(file)
     monkeypatch.setattr(
-        "adhesis.ensemble.aggregate.by_blocks.HELD_AT_ONCE", 18
+        "adhesis.ensemble.aggregate.average.HELD_AT_ONCE", 18
     )  # 3 columns of 6 rows
-    monkeypatch.setattr("adhesis.ensemble.aggregate.by_blocks.READ_AT_ONCE", 100)
+    monkeypatch.setattr("adhesis.ensemble.aggregate.average.READ_AT_ONCE", 100)
     pieces = aggregate(file)
     for one, two in zip(whole.cells, pieces.cells, strict=True):
         for name, curve in one.curves.items():
@@ -233,7 +232,7 @@ def test_a_file_without_a_finished_task_is_refused(tmp_path):
 
 MEMORY = """
 import sys
-from adhesis.ensemble.aggregate import by_blocks as blocks
+from adhesis.ensemble.aggregate import average as blocks
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.run.launch import peak_bytes
 blocks.HELD_AT_ONCE //= 20

@@ -8,14 +8,14 @@ import pytest
 
 import adhesis.ensemble.bench.benchmark as benchmarking
 from adhesis.ensemble.bench.bench_figure import draw
-from adhesis.ensemble.bench.benchmark import Line, Reference, benchmark, page
+from adhesis.ensemble.bench.benchmark import Line, benchmark, page
 from adhesis.ensemble.bench.measure import Measurement, Run, measure
 from adhesis.ensemble.bench.scenes import ONE_WAVE, SMALL_ROUGH, TWO_WAVES
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.run.launch import peak_bytes
 from tests.support.campaign_support import table_of
 
-REFERENCE = Reference(1.0, "made up")
+REFERENCE = (1.0, "made up")
 
 
 def line(method, setting, seconds, error) -> Line:
@@ -84,9 +84,7 @@ def test_reference_is_the_tightest_run_that_finishes(monkeypatch):
     monkeypatch.setattr(benchmarking, "measure", tightest_fails)
     lines = list(benchmark([SMALL_ROUGH], seconds=60.0))
     assert (1e-7, 40) in asked
-    assert {line.reference for line in lines} == {
-        Reference(3.0, "sharp, accuracy 1e-07, 40 load steps")
-    }
+    assert {line.reference for line in lines} == {(3.0, "sharp, accuracy 1e-07, 40 load steps")}
 
 
 def test_page_has_every_run_and_says_what_did_not_finish():
@@ -109,6 +107,7 @@ def test_figure_has_a_panel_for_each_scene_even_if_nothing_finished():
     draw([failed("sharp", 1e-3)])
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_command_writes_table_records_and_figure(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(benchmarking, "measure", fake_measure)
     assert main(["bench", "--quick", "--to", str(tmp_path / "new")]) == 0

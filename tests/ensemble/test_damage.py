@@ -19,8 +19,8 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.report.findings import missing
 from adhesis.ensemble.report.markdown_page import write_page
-from adhesis.ensemble.results import head
-from adhesis.ensemble.results.head import write_head
+from adhesis.ensemble.results import checksum
+from adhesis.ensemble.results.checksum import write_head
 from adhesis.ensemble.results.merge import merge
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, PENDING, ROW_DATASETS
@@ -143,7 +143,9 @@ def test_a_file_whose_rows_have_not_all_numbers_of_today_is_not_called_damaged(
 ):
     changed(path, lambda file: file.__delitem__("friction"))
     with monkeypatch.context() as then:
-        then.setattr(head, "ROW_DATASETS", [d for d in head.ROW_DATASETS if d.name != "friction"])
+        then.setattr(
+            checksum, "ROW_DATASETS", [d for d in checksum.ROW_DATASETS if d.name != "friction"]
+        )
         write_head(path)
     verdict, sentence = damage.judge(path.read_bytes())
     assert verdict == "refused"

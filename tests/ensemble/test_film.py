@@ -9,11 +9,10 @@ import pytest
 from matplotlib.animation import FFMpegWriter
 from PIL import Image
 
-import adhesis.ensemble.loop.film_scenes as scenes_module
+import adhesis.ensemble.loop.film as scenes_module
 from adhesis import Control, InputError, LoopResult, Problem, run_loop, single_wave
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.loop.film import Film
-from adhesis.ensemble.loop.film_scenes import scenes_of
+from adhesis.ensemble.loop.film import Film, scenes_of
 from tests.support.browser import needs_browser, seen_by_browser
 from tests.support.exact_wave import ExactWave
 from tests.support.scenes import HALF_SPACE, loop_of, rough

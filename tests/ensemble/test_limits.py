@@ -14,7 +14,6 @@ from tests.support.campaign_support import (
     adhesis_here,
     command,
     environment,
-    run_python,
     write_campaign,
 )
 from tests.support.processes import ran
@@ -101,26 +100,6 @@ def test_a_command_under_a_limit_ends_in_one_sentence_and_leaves_nothing_half_wr
     # without the lines that tell every ten seconds how far it is
     (sentence,) = (line for line in done.stderr.splitlines() if not line.endswith(" s"))
     assert sentence.startswith(f"adhesis {name}: ")
-
-
-def test_a_python_process_survives_a_row_that_the_disk_did_not_take(finished: Path) -> None:
-    """HDF5 would end it with a segmentation fault when the process ends."""
-    code = (
-        "import resource, sys\n"
-        "from adhesis.ensemble.errors import WriteError\n"
-        "from adhesis.ensemble.results.write import Writer\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))\n"
-        "try:\n"
-        "    with Writer(sys.argv[1]) as writer:\n"
-        "        writer.write_failure(3, 'no result', 1.0)\n"
-        "except WriteError as error:\n"
-        "    print(error)\n"
-    )
-    copy = finished / "copy.h5"
-    copy.write_bytes((finished / "r.h5").read_bytes())
-    done = run_python("-c", code, copy)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == f"row 3 of {copy} could not be written: File too large\n"
 
 
 @pytest.mark.parametrize(

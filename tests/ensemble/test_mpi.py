@@ -50,11 +50,11 @@ def test_loops_have_the_same_bits_on_ranks_resumed_and_in_parts(tmp_path):
     Ranks write to a path of any length: Open MPI 4.1 has buffers of 256 bytes for it.
     """
     some = {"hurst": "[0.8]", "work_of_adhesion": "[0.04]", "load_steps": "8"}
-    text = campaign_text(max_penetration="[0.3, 0.45, 0.6]", method='"sharp"', **some)
+    text = campaign_text(max_penetration="[0.3, 0.6]", method='"sharp"', **some)
     path, whole = tmp_path / "c.toml", tmp_path / "whole.h5"
     path.write_text(text.replace("nodes_per_wave = 16\n", ""))
     campaign = load_campaign(path)
-    assert run_campaign(campaign, whole).done == 6
+    assert run_campaign(campaign, whole).done == 4
     folder = tmp_path.joinpath("d" * 120, "e" * 200)
     folder.mkdir(parents=True)
     out = folder / f"{'n' * 240}.h5"
@@ -67,12 +67,12 @@ def test_loops_have_the_same_bits_on_ranks_resumed_and_in_parts(tmp_path):
     resumed = tmp_path / "resumed.h5"
     shutil.copy(whole, resumed)
     with Writer(resumed) as writer:
-        writer.reset([1, 2, 4])
-    assert run_campaign(campaign, resumed).computed == 3
+        writer.reset([1, 2])
+    assert run_campaign(campaign, resumed).computed == 2
     assert differences(resumed, whole) == []
     parts = [tmp_path / "1.h5", tmp_path / "2.h5"]
     for k, part in enumerate(parts, start=1):
-        assert run_campaign(campaign, part, options=Options(part=Part(k, 2))).done == 3
+        assert run_campaign(campaign, part, options=Options(part=Part(k, 2))).done == 2
     merge(parts, tmp_path / "merged.h5")
     assert differences(tmp_path / "merged.h5", whole) == []
 

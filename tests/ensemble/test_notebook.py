@@ -10,6 +10,7 @@ import pickle
 import re
 import sys
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
@@ -344,15 +345,25 @@ def test_what_no_file_can_be_called_is_refused(name, campaign, result):
             function(name)
 
 
-def test_a_campaign_is_priced_run_resumed_and_opened(campaign, tmp_path, capsys):
-    file = tmp_path / "my.h5"
+@pytest.fixture(scope="module")
+def computed(campaign, tmp_path_factory):
+    """The results file of the campaign, and its rows, computed here without a word."""
+    file, shown = tmp_path_factory.mktemp("computed") / "my.h5", io.StringIO()
+    with redirect_stdout(shown), redirect_stderr(shown):
+        results = campaign.run(file)
+    assert shown.getvalue() == ""
+    return file, results.dataset.load()
+
+
+def test_a_campaign_is_priced_run_resumed_and_opened(campaign, computed, capsys):
+    file, rows = computed
     price = campaign.price(seconds=0.1)
     assert price.tasks == price.left == 4
     assert "4 tasks to do in 4 cells" in str(price)
     assert repr(price).startswith("<Price: 4 of 4 tasks to do, ")
     assert str(price).splitlines()[0] in html.unescape(price._repr_html_())
-    assert not file.exists()
     with campaign.run(file) as results:
+        assert results.dataset.loss.identical(rows.loss)
         assert results.losses.shape[0] == 4
         assert bool((results.dataset.loss > 0).all())
         drops = results.jumps.energy_drop.sum()
@@ -436,16 +447,16 @@ def test_campaigns_run_outside_the_main_thread(tmp_path):
 
 
 @pytest.mark.mpi
-def test_ranks_compute_the_same_rows(campaign, tmp_path, capfd, monkeypatch):
+def test_ranks_compute_the_same_rows(campaign, computed, tmp_path, capfd, monkeypatch):
     """Started from another thread, as a server does."""
-    alone = campaign.run(tmp_path / "1.h5")
+    _, rows = computed
     ranks = asyncio.run(asyncio.to_thread(campaign.run, tmp_path / "2.h5", ranks=2))
     assert not any("tasks" in text for text in capfd.readouterr())
     shown = io.StringIO()  # what a notebook has as stderr is not the process's own
     monkeypatch.setattr("sys.stderr", shown)
     campaign.run(tmp_path / "2.h5", ranks=2, progress=True)
     assert "4 of 4 tasks done" in shown.getvalue()
-    assert alone.dataset.loss.identical(ranks.dataset.loss)
+    assert rows.loss.identical(ranks.dataset.loss)
     other = adhesis.Campaign(campaign.text.replace("young = 1000000.0", "young = 2e6"))
     with pytest.raises(InputError, match="young"):
         other.run(tmp_path / "2.h5", ranks=2)

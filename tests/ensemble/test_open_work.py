@@ -9,7 +9,7 @@ import adhesis
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.report.findings import law, verdict
-from adhesis.ensemble.report.tables.loss_tables import losses
+from adhesis.ensemble.report.tables.campaign_tables import losses
 from adhesis.ensemble.task.compute import Runner
 from adhesis.ensemble.task.doubt import beyond_zero_range
 from adhesis.ensemble.trace.answer import check as check_trace

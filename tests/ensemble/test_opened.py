@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 import adhesis
 from adhesis.ensemble.campaign.tasks import Part
 from adhesis.ensemble.report.figures.catalogue import ALL
-from adhesis.ensemble.report.tables.loss_tables import losses
+from adhesis.ensemble.report.tables.campaign_tables import losses
 from adhesis.ensemble.results.layout import create
 from tests.support.synthetic_results import campaign, rows, sign, write
 

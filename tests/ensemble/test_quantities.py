@@ -7,8 +7,8 @@ import pytest
 
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import parser_of
+from adhesis.ensemble.command.options import turns_of
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.loop.cycle import turns_of
 from adhesis.ensemble.quantities import (
     HEIGHT,
     LENGTH,
@@ -99,7 +99,7 @@ def test_keys_of_a_campaign_take_quantities_with_units() -> None:
 def test_turning_points_under_a_load_are_stresses_with_units() -> None:
     parser = parser_of("loop")
     args = parser.parse(["--stiffness", "0", "--max-stress", "0.2kPa,500, 1e-3MPa"])
-    assert turns_of(args, Control(0.0)).points == (200.0, 500.0, 1000.0)
+    assert turns_of(args, Control(0.0))["turning_points"] == (200.0, 500.0, 1000.0)
 
 
 def test_quantities_are_shown_in_a_unit_of_their_size() -> None:

@@ -16,9 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.markers import CARETDOWN
 
-from adhesis.ensemble.aggregate.average import aggregate
-from adhesis.ensemble.aggregate.by_blocks import BIN_EDGES, BINS_PER_DECADE
-from adhesis.ensemble.aggregate.companions import differing_keys, kind_of
+from adhesis.ensemble.aggregate.average import BIN_EDGES, BINS_PER_DECADE, aggregate
+from adhesis.ensemble.aggregate.cells import differing_keys, kind_of
 from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import Campaign
@@ -28,8 +27,7 @@ from adhesis.ensemble.report.figures import catalogue, loops, loss_figures, shap
 from adhesis.ensemble.report.figures.style import save, style
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.report.markdown_page import write_page
-from adhesis.ensemble.report.tables import loss_tables
-from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
+from adhesis.ensemble.report.tables import campaign_tables
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.task.compute import make_problem
 from adhesis.ensemble.task.fields import GAP_BINS
@@ -131,7 +129,7 @@ def test_the_paper_stands_beside_its_own_campaigns_alone(tmp_path):
     page = write_page(data, catalogue.sections(data))
     assert "19.36" not in page
     assert "aper" not in page.replace("paper.h5", "")
-    loss_tables.losses(data).write_csv(tmp_path / "losses.csv")
+    campaign_tables.losses(data).write_csv(tmp_path / "losses.csv")
     assert "19.36" not in (tmp_path / "losses.csv").read_text()
     with style():
         assert "paper" not in lines_of(loss_figures.loss_against_hurst(data).axes[0])
@@ -139,7 +137,7 @@ def test_the_paper_stands_beside_its_own_campaigns_alone(tmp_path):
 
 def test_tables_print_as_plain_lines(data):
     """On a terminal, too: a table that is fitted into its width has its numbers cut."""
-    lines = str(loss_tables.losses(data)).splitlines()
+    lines = str(campaign_tables.losses(data)).splitlines()
     assert len(lines) == 2 + 6
     assert lines[6].split()[:3] == ["0.8", "0.04", "5"]
     assert "19.36" in lines[6]
@@ -148,8 +146,8 @@ def test_tables_print_as_plain_lines(data):
 
 def test_jumps_by_kind_add_up_to_all_drops(data):
     """Those of all jumps: test_opened.py."""
-    glance = mechanism_tables.shares_by_kind(data)
-    place = {row[:3]: row[-1] for row in mechanism_tables.jumps(data).rows}
+    glance = campaign_tables.shares_by_kind(data)
+    place = {row[:3]: row[-1] for row in campaign_tables.jumps(data).rows}
     for row in glance.rows:
         assert sum(row[2:]) == pytest.approx(1)
         for column, share in zip(glance.columns[2:], row[2:], strict=True):
@@ -342,7 +340,7 @@ def test_spectra_carry_both_reference_slopes(data, drawn):
         assert (y[-1] - y[0]) / (x[-1] - x[0]) == pytest.approx(slope, abs=1e-5)
     x, y = np.log(lines["0.90"]).T
     assert (y[-1] - y[0]) / (x[-1] - x[0]) == pytest.approx(-2.8, abs=1e-3)
-    rows_of = {(r[0], r[1], r[2], round(r[3], 2)): r[5] for r in mechanism_tables.slopes(data).rows}
+    rows_of = {(r[0], r[1], r[2], round(r[3], 2)): r[5] for r in campaign_tables.slopes(data).rows}
     assert rows_of[0.7, 0.01, "unloading", 0.9] == pytest.approx(-2.7, abs=1e-3)
 
 
@@ -462,7 +460,7 @@ def test_the_order_of_the_losses_in_m2_is_reported_as_one_through_hurst(losses, 
 
 def test_findings_compare_with_the_paper(data):
     text = "\n".join(findings.agreement(data))
-    table = loss_tables.beside_the_paper(data)
+    table = campaign_tables.beside_the_paper(data)
     assert len(table.rows) == 6
     off = []
     for row in table.rows:
@@ -477,7 +475,7 @@ def test_findings_compare_with_the_paper(data):
             assert row[8] == ("yes" if loss.low <= value <= loss.high else "no")
     assert "Of the 8 losses of the paper's Table 1, 5 have a cell here" in text
     assert f"{100 * min(off):+.1f} % to {100 * max(off):+.1f} %" in text
-    profiles = loss_tables.profiles(data)
+    profiles = campaign_tables.profiles(data)
     names = [column.name for column in profiles.columns]
     slopes = [(row[names.index("m2_mean")], row[names.index("m2_paper")]) for row in profiles.rows]
     assert slopes[1] == (pytest.approx(0.002), 0.0027)
@@ -538,7 +536,7 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
     solver = "[solver]\naccuracy = 1e-4\n[output]"
     finer = companion(tmp_path, "finer.h5", 1.02, "[output]", solver)
     steps = companion(tmp_path, "steps.h5", 0.99, "load_steps = 20", "load_steps = 40")
-    alone = {row[:2]: row for row in loss_tables.losses(data).rows}
+    alone = {row[:2]: row for row in campaign_tables.losses(data).rows}
     both = aggregate(file, [finer, steps])
     doubts = [text for text in findings.quality(both) if "beside this campaign" in text]
     wrong = [row["row"] for row in read_status(finer)["doubtful"]]
@@ -550,10 +548,10 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
     assert said in findings.quality(aggregate(file, [other]))
     assert [c.kind for c in both.companions] == ["resolution", "load steps"]
     assert both.companions[1].differs == ("cycle.load_steps = 40",)
-    names = [column.name for column in loss_tables.losses(both).columns]
+    names = [column.name for column in campaign_tables.losses(both).columns]
     by_steps = names.index("loss_dimensionless_error_load_steps")
     by_grid = names.index("loss_dimensionless_error_resolution")
-    for row in loss_tables.losses(both).rows:
+    for row in campaign_tables.losses(both).rows:
         cell = data.finished(row[:1], row[1:2])[0]
         loss = cell.values["loss_dimensionless"]
         assert row[by_grid] == pytest.approx(0.02 * loss.mean())
@@ -562,10 +560,10 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
         audit = np.abs(cell.values["loss"] - cell.values["loss_from_drops"]) / cell.values["loss"]
         assert alone[row[:2]][by_steps] == pytest.approx(np.mean(audit * loss))
     difference = "± steps: the difference from the campaign with other load steps beside this one"
-    assert f"{difference};" in loss_tables.losses(both).notes()
+    assert f"{difference};" in campaign_tables.losses(both).notes()
     with h5py.File(steps, "r+") as other:
         other["status"][:5] = 0
-    some = loss_tables.losses(aggregate(file, [steps]))
+    some = campaign_tables.losses(aggregate(file, [steps]))
     assert some.rows[0][by_steps] == alone[some.rows[0][:2]][by_steps]
     assert f"{difference}, mean |loop integral - sum of drops| where that lacks a cell;" in (
         some.notes()
@@ -641,7 +639,7 @@ def test_a_report_compares_and_doubts_no_loss_without_adhesion(tmp_path):
     assert not any("WARNING" in text or "below 0 nm" in text for text in findings.quality(data))
     known = [np.isfinite(cell.estimates["loss"].low) for cell in data.cells]
     assert known == [False, True]
-    table = loss_tables.losses(data)
+    table = campaign_tables.losses(data)
     shown = table.markdown().splitlines()[2].split("|")
     assert "0.000" in shown[4]  # rounding is no loss
     place = [column.name for column in table.columns].index("loss_mean [J/m^2]")
@@ -685,7 +683,7 @@ def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
     assert "touch_range 4e-10 m" in as_text(status)
     assert "row 6: H = 0.7, γ = 0.02 J/m², realisation 2" in as_text(status)
     assert "no finite range, loss 0.21 J/m²" in as_text(status)
-    table = loss_tables.losses(data)
+    table = campaign_tables.losses(data)
     names = [column.name for column in table.columns]
     shown = [row[names.index("valid_range_least [m]")] for row in table.rows]
     assert shown == pytest.approx([0.5e-9, values["valid_range"][4:].min()])
@@ -708,7 +706,7 @@ def test_losses_at_a_range_that_matters_beyond_touches_are_said(tmp_path):
     values["touch_range"][2] = 0.99 * 0.02 / 1e9
     values["zone_error"][:] = [1e-6, 2e-6, 3e-6, 4e-6]
     path = write(tmp_path / "r.h5", plan, values)
-    table = loss_tables.losses(aggregate(path))
+    table = campaign_tables.losses(aggregate(path))
     (place,) = (k for k, column in enumerate(table.columns) if column.heading == "± zones")
     assert table.columns[place].name == "zone_error_mean [J/m^2]"
     assert table.rows[0][place] == pytest.approx(2.5e-6)
@@ -817,4 +815,4 @@ def test_loops_of_a_machine_are_drawn_against_its_own_penetration(tmp_path):
     with style():
         figure = loops.loop_against_penetration(data)
     assert "u_\\mathrm{tot}" in figure.axes[0].get_xlabel()
-    assert "| u_tot/h_max |" in mechanism_tables.slopes(data).markdown().splitlines()[0]
+    assert "| u_tot/h_max |" in campaign_tables.slopes(data).markdown().splitlines()[0]

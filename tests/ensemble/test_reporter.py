@@ -5,7 +5,7 @@ import sys
 import time
 
 from adhesis.ensemble.reporter import bar, interval
-from adhesis.ensemble.run.progress import ProgressLine, Summary
+from adhesis.ensemble.run.session import ProgressLine, Summary
 from tests.support.campaign_support import wait_until
 
 

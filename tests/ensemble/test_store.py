@@ -18,12 +18,11 @@ from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.results import schema
-from adhesis.ensemble.results.disk_file import DiskFile
-from adhesis.ensemble.results.head import write_head
+from adhesis.ensemble.results.checksum import write_head
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DATASETS, DONE, FAILED, scales
-from adhesis.ensemble.results.write import DatasetRows, Writer
+from adhesis.ensemble.results.write import DatasetRows, DiskFile, Writer
 from adhesis.ensemble.run.lock import RunLock, holder
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.row import RESULT_DATASETS

@@ -20,6 +20,7 @@ from matplotlib.image import imread
 
 from adhesis import Control, self_affine_profile, stripes
 from adhesis.ensemble.command.main import main
+from adhesis.ensemble.command.options import what_was_read
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.trace import answer as answers
 from adhesis.ensemble.trace.answer import (
@@ -33,7 +34,6 @@ from adhesis.ensemble.trace.answer import (
 from adhesis.ensemble.trace.answer import document as document_of
 from adhesis.ensemble.trace.figures import _tables as tables_of
 from adhesis.ensemble.trace.loops import Loops
-from adhesis.ensemble.trace.options import what_was_read
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 from adhesis.ensemble.trace.trace_page import page_text, summary
@@ -364,8 +364,8 @@ def test_what_changes_the_loss_most_stands_first_with_its_factor(spoiled_answer:
     assert page.index(f"- **changes**: {text}") < page.index("**Warning:** doubt")
     assert answers.document(found)["largest_changes"][0] == {"name": "cut-off × 4", "factor": 3.73}
     nothing = with_losses(spoiled_answer, losses | {"noise 1": 0.0}, {"step": 1e-6})
-    (change,) = nothing.largest_changes
-    assert (change.run.name, change.factor) == ("noise 1", 0.0)
+    ((run, factor),) = nothing.largest_changes
+    assert (run.name, factor) == ("noise 1", 0.0)
 
 
 @pytest.mark.usefixtures("quick_figures")
@@ -403,9 +403,9 @@ def test_a_crest_that_carries_all_contact_is_warned_of_and_left_out_once(tmp_pat
     answer = run_plan(trace, cycle, plan)
     assert answer.warnings[0].startswith("a single crest at 640 µm stands")
     assert answer.warnings[1].startswith("one crest at 640 µm carries all contact")
-    (change,) = answer.largest_changes
-    assert change.run.description == "crest at 640 µm bridged by straight lines"
-    assert change.factor > 5
+    ((run, factor),) = answer.largest_changes
+    assert run.description == "crest at 640 µm bridged by straight lines"
+    assert factor > 5
     # The loop without it is that of the trace from which it is excluded.
     (feature,) = trace.features
     clean = prepare_trace(Trace(z, 1e-6, "t.txt"), exclude=[(feature.begin, feature.end)])
@@ -422,7 +422,7 @@ def test_a_crest_that_carries_all_contact_is_warned_of_and_left_out_once(tmp_pat
 
 
 def test_the_command_plans_with_ranges_left_out_and_writes_nothing(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("adhesis.ensemble.trace.options._LARGE", 0)
+    monkeypatch.setattr("adhesis.ensemble.command.options._LARGE", 0)
     monkeypatch.setattr("adhesis.ensemble.reporter.interval", lambda elapsed: 1e-3)
     path = tmp_path / "t.txt"
     rows = [f"{1e6 * a:.3f};{1e6 * z:.6f}" for a, z in zip(X, PROFILE.at(X), strict=True)]

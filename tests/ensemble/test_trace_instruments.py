@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,6 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from tests.support import instrument_files
-from tests.support.campaign_support import run_python
 
 pytestmark = pytest.mark.skipif(
     not instrument.available(), reason="the optional package SurfaceTopography is not installed"
@@ -131,14 +131,14 @@ def test_heights_without_lengths_are_not_asked_of_the_reader(tmp_path: Path) -> 
         read_trace(tmp_path / "a.h5")
 
 
-def test_a_file_of_no_reader_is_refused_in_one_sentence(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_file_of_no_reader_is_refused_in_one_sentence(tmp_path, caplog, capsys, monkeypatch):
     """One of the readers logs the bytes that it cannot use."""
     (tmp_path / "a.bin").write_bytes(bytes(range(256)) * 20)
-    words = ("trace", tmp_path / "a.bin", "--plan", "--work-of-adhesion", 0.01)
-    process = run_python("-m", "adhesis", *words, "--young", 1e6, "--poisson", 0.5)
-    (sentence,) = process.stderr.splitlines()
+    words = ["trace", str(tmp_path / "a.bin"), "--plan", "--work-of-adhesion", "0.01"]
+    with monkeypatch.context() as alone:
+        alone.setattr(logging.root, "handlers", [])  # as those of a command, which has set up none
+        assert main([*words, "--young", "1e6", "--poisson", "0.5"]) == 2
+    (sentence,) = capsys.readouterr().err.splitlines()
     assert sentence.startswith("adhesis trace: ")
     assert "is neither text nor an instrument format" in sentence
     with pytest.raises(InputError):

@@ -16,6 +16,7 @@ from adhesis.ensemble import exit_codes
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
 from tests.support.campaign_support import ROOT
+from tests.support.fake_run import run_file
 from tools import commands as commands_page
 from tools import transcripts
 
@@ -51,7 +52,7 @@ class Block:
 
 def blocks(page: Path) -> Iterator[Block]:
     """Every block, in order; paragraphs of an indented block are blocks of their own."""
-    for token in MarkdownIt("commonmark").parse(page.read_text()):
+    for token in MarkdownIt("commonmark").disable("inline").parse(page.read_text()):
         if token.type == "fence":
             yield Block(page, token.info, token.content)
         elif token.type == "code_block":
@@ -122,7 +123,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "my.toml").write_text(example())
     heights = "\n".join(f"{1e-6 * (-1) ** k / (1 + k % 7)}" for k in range(31))
     (folder / "heights.csv").write_text(heights)
-    assert main(["run", str(folder / "my.toml"), "--out", str(folder / "my.h5")]) == 0
+    assert run_file(folder / "my.toml", folder / "my.h5").failed == 0
     assert main(["sample", str(folder / "trace.csv")]) == 0
     return folder
 

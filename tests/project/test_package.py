@@ -28,8 +28,6 @@ def test_versions_agree() -> None:
     citation = (ROOT / "CITATION.cff").read_text()
     reported = dict(re.findall(r"^([a-z-]+): (.+)$", citation, re.MULTILINE))
     assert (reported["version"], reported["license"]) == (PROJECT["version"], PROJECT["license"])
-    assert re.search(r'volume: 92\n    start: "062404"', citation)
-    assert "value: arXiv:1511.08891" in citation
     assert adhesis.__version__ == PROJECT["version"]
     heads = re.findall(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
     assert heads[0] == PROJECT["version"]
@@ -73,20 +71,10 @@ def test_the_reference_names_what_there_is() -> None:
     assert len([pkgutil.resolve_name(name) for name in names]) > len(PUBLIC)
 
 
-RETURNED = {"ContactState", "Fields", "Jump", "LoopState", "MinorLoop", "Opening", "PathResult"}
-"""Results, which a user gets from what has an example."""
-SUBCLASSED = {"Method", "Path"}
-"""For methods of one's own."""
-RAISED = {"InputError", "PathError"}
-
-
-def test_what_is_public_has_an_example_and_all_examples_are_right() -> None:
+def test_all_examples_of_what_is_public_are_right() -> None:
     """Also those of methods, inherited ones included."""
-    public = {name: getattr(adhesis, name) for name in [*adhesis.__all__, *BESIDE]}
-    found = {name: doctest.DocTestFinder(recurse=False).find(each) for name, each in public.items()}
-    without = {name for name, own in found.items() if not any(test.examples for test in own)}
-    assert without == RETURNED | SUBCLASSED | RAISED
-    owners = {owner for each in public.values() for owner in getattr(each, "__mro__", (each,))}
+    public = [getattr(adhesis, name) for name in [*adhesis.__all__, *BESIDE]]
+    owners = {owner for each in public for owner in getattr(each, "__mro__", (each,))}
     modules = {owner.__module__ for owner in owners if owner.__module__.startswith("adhesis.")}
     assert {"adhesis.solver.views", "adhesis.solver.loading.loop"} < modules
     wrong = [name for name in sorted(modules) if doctest.testmod(sys.modules[name]).failed]
@@ -166,15 +154,6 @@ def test_a_command_loads_no_more_than_it_needs(tmp_path: Path) -> None:
     assert "matplotlib" in loaded["report"]
     assert "mpi4py" not in loaded["report"] | loaded.get("scan", set())
     assert "scan" not in loaded or "SurfaceTopography" in loaded["scan"]
-
-
-@pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").glob("*.py")), ids=lambda p: p.stem)
-def test_what_a_benchmark_imports_is_there(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No test runs most of them."""
-    monkeypatch.syspath_prepend(path.parent)
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module != "__future__":
-            exec(ast.unparse(node), {})  # raises ImportError
 
 
 def test_the_types_of_the_kernels_are_those_of_the_module() -> None:

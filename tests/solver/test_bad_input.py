@@ -282,11 +282,11 @@ checks.instance('problem', RELOADED(), Problem, 'Problem(…)') ->
     TypeError: problem is a Problem made before a reload of adhesis
 make_method('auto', WAVE) -> TypeError: problem is a Profile: it must be a Problem; make one with
 make_method(PROBLEM, 'auto') -> TypeError: method is a Problem: it must be one of grid, sharp
-make_method('magic', PROBLEM) -> ValueError: method is 'magic': it must be one of grid, sharp, auto
+make_method('magic', PROBLEM) -> ValueError: method is 'magic': it must be one of grid, sharp, zones
 make_method('grid', Problem(spectral(ratio=1000), SOLID, 1), nodes_per_wave=10 ** 5) ->
     ValueError: nodes_per_wave is 100000: with 2000 waves it must be at most 33554, 67108864 nodes
 make_method('sharp', PROBLEM, nodes_per_wave=32) ->
-    ValueError: nodes_per_wave is 32: it belongs to the method 'grid' alone
+    ValueError: nodes_per_wave is 32: it belongs to the methods 'grid' and 'zones'
 ExactWave(WAVE) -> TypeError: problem is a Profile: it must be a Problem
 Method(PROBLEM) -> TypeError: Can't instantiate abstract class Method
 loop(method=PROBLEM) ->
@@ -323,8 +323,8 @@ Problem(WAVE, SOLID, 0.0, work_of_adhesion_open=0.1) ->
     ValueError: it must be left out, as γ is 0
 Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0, strength=1000000.0) ->
     ValueError: beside a strength of 1e+06 Pa: give
-make_method('auto', Problem(WAVE, SOLID, 0.004, adhesion_range=1e-9), nodes_per_wave=64) ->
-    ValueError: nodes_per_wave is 64 beside a range or strength
+make_method('zones', Problem(WAVE, SOLID, 0.004, adhesion_range=1.0)) ->
+    ValueError: adhesion_range is 1 m, strength 0.004 Pa: the range must be at most
 make_method('auto', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0), nodes_per_wave=32) ->
     ValueError: nodes_per_wave is 32 beside a work_of_adhesion_open
 stripes(3, 1.0) -> ValueError: amplitude is 1.0: it must be

@@ -78,7 +78,7 @@ def test_density_of_the_gap_on_a_rough_profile_is_a_converged_one():
 def test_openings_of_both_methods_are_one():
     problem = Problem(rough(2, 8, 3), SOFT, 0.02)
     found = []
-    for name, options in (("sharp", {"accuracy": 1e-4}), ("grid", {"nodes_per_wave": 64})):
+    for name, options in (("sharp", {"accuracy": 1e-4}), ("grid", {"nodes_per_wave": 32})):
         method = make_method(name, problem, **options)
         state = loaded(method, 0.5)
         openings = method.openings(state)

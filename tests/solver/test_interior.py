@@ -95,7 +95,7 @@ def test_no_state_that_is_left_out_has_more_tension(young, seed):
 
 def test_grid_and_sharp_agree():
     sharp = loop_of(1e8, 4, 1)
-    method = make_method("grid", sharp.problem, nodes_per_wave=64)
+    method = make_method("grid", sharp.problem, nodes_per_wave=32)
     grid = run_loop(method, max_penetration=0.9, load_steps=20)
     assert grid.valid_range == pytest.approx(sharp.valid_range, rel=0.03)
     assert grid.interior.position == pytest.approx(sharp.interior.position, abs=1e-3 * PERIOD)

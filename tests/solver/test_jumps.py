@@ -2,14 +2,7 @@
 
 import numpy as np
 
-from adhesis.solver.model.jump import JUMP_KINDS, SMALL_SCALE, Jump, classify
-
-
-def test_only_running_edges_are_small_scale():
-    assert {"spreading", "receding"} == SMALL_SCALE
-    for kind in JUMP_KINDS:
-        jump = Jump("loading", 0.0, 0.0, kind, 1, 1, 0.1, 0.2, 0.1)
-        assert jump.small_scale == (kind in ("spreading", "receding"))
+from adhesis.solver.model.jump import JUMP_KINDS, classify
 
 
 def states(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

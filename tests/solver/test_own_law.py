@@ -85,10 +85,6 @@ def wavy_up_to(theta: float, recedes: bool) -> float:
     return float(theta + 0.5 - 0.5 * np.cos(theta))
 
 
-def test_a_law_that_keeps_its_contract_is_taken() -> None:
-    SharpMethod(FLAT, adhesion=PythonAdhesion(False, 0.5, 1.5, wavy, wavy_up_to))
-
-
 @pytest.mark.parametrize("phase", [0.0, 0.5])
 def test_equal_parts_and_mirror_images_are_those_that_a_law_of_its_own_shares(phase: float) -> None:
     """Both crests were taken to be alike, and to touch at once, although adhesion parts them."""

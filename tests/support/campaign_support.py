@@ -18,8 +18,7 @@ import h5py
 import numpy as np
 import pytest
 
-from adhesis.ensemble.campaign.compare import growth
-from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tables import Campaign, growth
 from adhesis.ensemble.command import run
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError

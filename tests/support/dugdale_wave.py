@@ -11,14 +11,19 @@ y = sin²(πa/λ), tan θ = sqrt((t - y)/(1 - t)), and φ the value of θ at c:
     s = A (1 - y + y ln y) + (2/λ) ∫_a^{λ/2} (λ/2 - x) (gap' - gap'_0) dx
 
 with gap_0 = 2A [u sqrt(u² - y) - y arcosh(u/sqrt(y))], u = sqrt(t), the gap without adhesion. At
-fixed separation surfaces jump together at s = A + δ, and the contact is lost where s has its
-maximum on the branch; between them the loop loses the work of the tension. For δ → 0 all this is
-Johnson's solution, in the flat measure.
+fixed separation surfaces jump together at s = A + δ, and part where s has its maximum on the
+branch; between them the loop loses the work of the tension. For δ → 0 all this is Johnson's
+solution, in the flat measure.
+
+The branch does not end where the contact vanishes: surfaces may attract each other and not touch,
+with a = 0 and a gap of δ - gap(c) at the crest. Where adhesion is weak or its range long that part
+of the branch holds the maximum of s (α = 0.3 and δ = 0.2 A, say), or all that is stable of it.
 
 Sources: Dugdale, J. Mech. Phys. Solids 8 (1960) 100; Maugis, J. Colloid Interface Sci. 150 (1992)
 243, for a sphere. The integrals above follow from those of a half-line.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -31,7 +36,8 @@ from scipy.optimize import brentq, minimize_scalar
 from adhesis.solver.model.profile import Array
 from adhesis.solver.references.single_wave import SingleWave
 
-_STATES = 24  # of the branch between the two jumps: a loss to 1e-9
+_STATES = 40  # of each part of the branch between the two jumps: a loss to 1e-9
+_APART = 1e-9  # of c: half-width that counts as no contact
 
 
 @cache
@@ -41,6 +47,23 @@ def _nodes() -> tuple[Array, Array, Array]:
     angle = np.pi / 4 * (nodes + 1)
     first, second = np.sin(angle) ** 2, np.cos(angle) ** 2
     return first, second, np.pi / 4 * np.sin(2 * angle) * weights
+
+
+def _highest(separation: Callable[[float], float], low: float, high: float) -> float:
+    options = {"xatol": 1e-9 * high}
+    found = minimize_scalar(
+        lambda a: -separation(a), bounds=(low, high), method="bounded", options=options
+    )
+    return float(found.x)
+
+
+def _work(state: Callable[[float], tuple[float, float]], low: float, high: float) -> float:
+    """Integrate p̄ ds from one state of a branch to another."""
+    ends = np.sqrt([low, high])  # what vanishes with the contact is smooth in the root
+    root = np.mean(ends) + 0.5 * np.ptp(ends) * chebpts1(_STATES)
+    states = np.transpose([state(one**2) for one in root])
+    s, p = (Chebyshev.fit(root, values, _STATES - 1, domain=ends) for values in states)
+    return float(np.diff((p * s.deriv()).integ()(ends))[0])
 
 
 @dataclass(frozen=True)
@@ -65,24 +88,35 @@ class DugdaleWave:
         tension = 2 * self._strength * float(phi) / np.pi
         return float(separation), wave.full_contact_stress * y - tension
 
+    def state_apart(self, c: float) -> tuple[float, float]:
+        """Compute s in m and p̄ in Pa of surfaces that attract over |x| < c and do not touch."""
+        pulled = self._integral(_APART * c, c, 0.5 * self.wave.period)
+        pulled += self._integral_beyond(_APART * c, c)
+        nearest = self.range_ - self._gap(_APART * c, c)
+        separation = self.wave.amplitude + nearest + 2 / self.wave.period * pulled
+        return separation, -2 * self._strength * c / self.wave.period
+
     @property
     def loss(self) -> float:
-        """Loss of one loop at fixed separation, J/m² of nominal area; 0 without hysteresis."""
+        """Loss of one loop at fixed separation, J/m² of nominal area."""
         wave, touch = self.wave, self.wave.amplitude + self.range_
-        low, high = 0.1 * wave.fold_half_width, wave.loop.touch_half_width
-        fold = minimize_scalar(
-            lambda a: -self.state(a)[0],
-            bounds=(low, high),
-            method="bounded",
-            options={"xatol": 1e-9 * high},
-        )
-        if -fold.fun <= touch:
-            return 0.0
-        ends = [fold.x, brentq(lambda a: self.state(a)[0] - touch, fold.x, high)]
-        a = np.mean(ends) + 0.5 * np.ptp(ends) * chebpts1(_STATES)
-        states = np.transpose([self.state(width) for width in a])
-        s, p = (Chebyshev.fit(a, values, _STATES - 1, domain=ends) for values in states)
-        return float(np.diff((p * s.deriv()).integ()(np.array(ends)))[0])
+        far = 0.49 * wave.period
+        touching = brentq(lambda c: self._gap(_APART * c, c) - self.range_, 1e-6 * far, far)
+        least, most = 1e-6 * wave.fold_half_width, wave.loop.touch_half_width
+        branch = [(self.state_apart, 1e-6 * touching, touching), (self.state, least, most)]
+        folds = [_highest(lambda a, part=part: part[0](a)[0], *part[1:]) for part in branch]
+        if self.state(folds[1])[0] > self.state_apart(folds[0])[0]:
+            branch = [(self.state, folds[1], most)]
+        else:
+            branch[0] = (self.state_apart, folds[0], touching)
+        loss = 0.0
+        for state, first, last in branch:
+            if state(first)[0] <= touch:  # the part before it has come as far
+                break
+            if state(last)[0] < touch:
+                last = brentq(lambda a, state=state: state(a)[0] - touch, first, last)
+            loss += _work(state, first, last)
+        return loss
 
     @property
     def _strength(self) -> float:

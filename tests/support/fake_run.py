@@ -29,8 +29,7 @@ from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.results.write import Writer
-from adhesis.ensemble.run.progress import Summary
-from adhesis.ensemble.run.session import Engine, Options, run_campaign
+from adhesis.ensemble.run.session import Engine, Options, Summary, run_campaign
 from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
 from adhesis.ensemble.task.row import RESULT_DATASETS, Row, row_scales
 

@@ -7,8 +7,7 @@ import numpy as np
 
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.results.checksum import row_checksums
-from adhesis.ensemble.results.head import write_head
+from adhesis.ensemble.results.checksum import row_checksums, write_head
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.schema import axis_datasets, kept_rows
 from adhesis.ensemble.task.dataset import KEPT

@@ -10,8 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.markers import CARETDOWN
 
-from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
-from adhesis.ensemble.aggregate.by_blocks import BIN_EDGES, BINS_PER_DECADE, SMALL
+from adhesis.ensemble.aggregate.average import (
+    BIN_EDGES,
+    BINS_PER_DECADE,
+    SMALL,
+    Aggregate,
+    AveragedCell,
+)
 from adhesis.ensemble.aggregate.cells import Cell, stress_scale
 from adhesis.ensemble.interval import Estimate
 from adhesis.ensemble.quantities import common_unit

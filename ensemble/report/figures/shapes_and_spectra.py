@@ -18,8 +18,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
-from adhesis.ensemble.aggregate.by_blocks import DeformedShape
+from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell, DeformedShape
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import style

@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import textwrap
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from pathlib import Path
@@ -28,8 +28,11 @@ from matplotlib.text import Annotation
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.outputs import whole_file
 from adhesis.solver.checks import counted, shown
+from adhesis.solver.model.jump import Branch
 
 Shown = TypeVar("Shown")
+Curve = tuple[Mapping[str, Any], Any, dict[str, Any]]
+"""Columns of states, the rows of those that are drawn, and the look of their line."""
 
 MM = 1 / 25.4  # inches
 _MOST_COLUMNS_INSIDE = 2  # of a legend in a panel that is given
@@ -279,6 +282,35 @@ def row_for_each_hurst(
 def label_panel(axes: Axes, text: str) -> None:
     """Write what a panel shows into its upper left corner."""
     axes.set_title(text, loc="left", pad=3)
+
+
+def draw_curves(curves: Iterable[Curve], ax: object = None) -> Figure:
+    """Draw curves.
+
+    ``ax`` is one Axes for the mean stress, or two for mean stress and contact fraction (TypeError,
+    ValueError).
+    """
+    with drawn_into(ax):
+        figure = new_figure(1, 2, TWO_COLUMNS, 62 * MM)
+        panels = figure.given or figure.panels
+        for states, rows, look in curves:
+            columns = (states["mean_stress"][rows] / 1e3, states["contact_fraction"][rows])
+            for panel, y in zip(panels, columns, strict=False):
+                panel.plot(states["penetration"][rows], y, **look)
+        stress, depth = panels[0], r"penetration $\Delta/h_{\max}$"
+        stress.axhline(0, color="0.7", lw=0.5, zorder=0)
+        stress.set(xlabel=depth, ylabel=r"mean stress $\bar p$ (kPa)")
+        for contact in panels[1:]:
+            contact.set(xlabel=depth, ylabel="contact fraction $A/A_0$", ylim=(0, None))
+        if len(stress.get_legend_handles_labels()[1]) > 1:
+            panels[-1].legend()
+        return figure.finish()
+
+
+def look_of_branch(branch: Branch, k: int = 0) -> dict[str, Any]:
+    """Return the look of a branch of the k-th loop; all loops share their loading branch."""
+    shade = "k" if branch == "loading" else colour(k)
+    return {"color": shade, "ls": LINE_OF_BRANCH[branch], "label": branch}
 
 
 def save(figure: Figure, stem: Path) -> None:

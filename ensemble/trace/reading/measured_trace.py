@@ -23,9 +23,13 @@ from adhesis.ensemble.trace.reading.header_units import (
 )
 from adhesis.ensemble.trace.reading.instrument import HINT, available, check_row, read_scan
 from adhesis.ensemble.trace.reading.missing_heights import invalid_rows, without_codes
-from adhesis.ensemble.trace.reading.printed_numbers import looks_like_numbers
 from adhesis.ensemble.trace.reading.source import Source, source_of
-from adhesis.ensemble.trace.reading.text_table import Table, read_table, refuse_uneven_rows
+from adhesis.ensemble.trace.reading.text_table import (
+    Table,
+    looks_like_numbers,
+    read_table,
+    refuse_uneven_rows,
+)
 from adhesis.solver import checks
 from adhesis.solver.checks import counted
 from adhesis.solver.model.profile import Array

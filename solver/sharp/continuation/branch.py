@@ -197,7 +197,7 @@ class StableBranch:
     def fold_ahead(self) -> tuple[float, float]:
         """Return d of the fold that is predicted, or infinity, and of a place beyond it."""
         predictor = self._predictor
-        way, distance = self._target.d - predictor.d, predictor.fold.distance
+        way, distance = self._target.d - predictor.d, predictor.leading.fold_distance
         across = predictor.across(distance, self._resolution.jump)
         return predictor.d + math.copysign(distance, way), predictor.d + math.copysign(across, way)
 
@@ -223,7 +223,7 @@ class StableBranch:
         predictor = self._predictor
         motion = PREDICTED_MOTION if predictor.way else LONGEST_STEP * STEP_REDUCTION
         size = min(self._longest, predictor.reach(motion * self._edges.wave, self.smallest_step))
-        if not predictor.fold.distance < self.smallest_step:
+        if not predictor.leading.fold_distance < self.smallest_step:
             size = max(size, self.smallest_step)
         left = self._target.d - self.point.d
         step = left if size >= abs(left) else math.copysign(size, left)
@@ -287,15 +287,15 @@ class StableBranch:
         fast, it may be seen too far away, or not at all.
         """
         predictor, resolution = self._predictor, self._resolution.jump
-        other = predictor.other_fold()
-        if math.isinf(other.distance):
+        other = predictor.other_leading()
+        if math.isinf(other.fold_distance):
             return
-        now = other.distance - predictor.fold.distance
+        now = other.fold_distance - predictor.leading.fold_distance
         apart, self._folds_apart = min(now, self._folds_apart), now
         self._two_folds = None
         if apart < resolution:
-            way = math.copysign(predictor.across(other.distance, resolution), predictor.way)
-            rate, edges = predictor.rate, (predictor.fold.edge, other.edge)
+            way = math.copysign(predictor.across(other.fold_distance, resolution), predictor.way)
+            rate, edges = predictor.rate, (predictor.leading.edge, other.edge)
             ahead = tuple((edge, float(np.sign(rate[edge] * way))) for edge in edges)
             self._two_folds = TwoFolds(ahead, predictor.d + way, apart)
 

@@ -166,7 +166,7 @@ class Descents:
                     return rest, raced
                 law = EdgeLaw(law)
                 law.smallest = self._smallest_of_last_gap(gaps, law.smallest)
-            if end.event in (DescentEvent.AT_REST, DescentEvent.STEP_LIMIT):
+            if end.event == DescentEvent.AT_REST:
                 # Next to a fold the field's error may hide whether there is a minimum: edges go to
                 # and fro. Whatever is taken for it, the next step in s decides.
                 rests += 1

@@ -143,7 +143,7 @@ class Follower:
         """Return whether surfaces may touch on the last step to a fold, the edges being held."""
         point, way = fold.point, abs(fold.d - fold.point.d)
         if not self.edges.is_fixed:
-            way *= max(1.0, abs(self.edges.solve_finer(point).by_prescribed()[1]))
+            way *= max(1.0, abs(point.field.solution.by_prescribed()[1]))
         # the mean gap closes by the gaps alone, the faster the less of the period they take
         closing = way * 2 * math.pi / lengths_of(point.gaps)[0].sum()
         return bool(self.nucleation.minimum(point.field)[0] <= closing)
@@ -212,7 +212,7 @@ class Follower:
         states: tuple[ContactState, ...] = ()
         if last is None or last.internal.gaps is not point.field.gaps:
             states = (self.states.of_point(point),)
-        before = self.states.of_point(point, held=(fold.d, self.edges.solve_finer(point)))
+        before = self.states.of_point(point, held=fold.d)
         start, orders = self._start_at_fold(fold)
         event = Event(before, fold.d, point.gaps, start, late=fold.late, orders=orders)
         jump = self.jumps.compute(event, target.direction)

@@ -168,7 +168,10 @@ class Jumps:
         unlike = point is not None and self.symmetry.is_broken(event.left, point.gaps)
         if at_stake is None and unlike:
             at_stake = 0.0
-        jump = self.states.jump(before, after, direction, at_stake)
+        jump = Jump.between(
+            before, after, direction, self.states.period, raced=at_stake is not None,
+            at_stake=at_stake or 0.0, falls_off=self.edges.is_load and not after.patches,
+        )  # fmt: skip
         misplaced = self.states.work(before, after, event.late)
         return ComputedJump(d, (before, after), jump, point, misplaced)
 
@@ -205,7 +208,8 @@ class Jumps:
         """
         if point is not None:
             return self.states.of_point(point)
-        return self.states.detached(before.separation * self.states.q0 if self.edges.is_load else d)
+        apart = before.separation if self.edges.is_load else d / self.states.q0
+        return ContactState.detached(apart)
 
     def _end_of(self, point: Point | None, d: float, equal_speeds: bool = False) -> Point | None:
         """Go on from a minimum at ``d`` until nothing touches."""

@@ -117,7 +117,6 @@ class StressSource:
             level_start=np.cumsum([0, *sizes[:-1]]),
             end_x=(t + 1) / 2,
             end_w=end / 2,
-            short_count=3 * p + 6,
             length_x=piece_x,
             length_w=piece_w,
             length_before=np.concatenate([[0.0], np.cumsum(whole * width)]),

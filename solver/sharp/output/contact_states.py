@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adhesis.solver._kernels import Field, LoadingDevice, SearchedGaps
+from adhesis.solver._kernels import LoadingDevice, SearchedGaps
 from adhesis.solver.method import ContactState
-from adhesis.solver.model.jump import Branch, Jump
+from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.gap.ends import union_of
@@ -77,10 +77,6 @@ class States:
         """Return the prescribed value of a state in field units, d."""
         return self.to_field_units(self.problem.prescribed_in(state))
 
-    def detached(self, separation: float) -> ContactState:
-        """Make the state without contact at q0 s = ``separation``."""
-        return ContactState.detached(separation / self.q0)
-
     def attracts_when_detached(self, d: float, touch: float | None = None) -> bool:
         """Return whether a state without contact at ``d`` would lie below q0 s = ``touch``.
 
@@ -93,22 +89,21 @@ class States:
         self,
         point: Point,
         separation: float | None = None,
-        held: tuple[float, Field] | None = None,
+        held: float | None = None,
     ) -> ContactState:
         """Make the state of a point, or of its edges ``held`` at another d.
 
-        That is given with a field that knows derivatives; ``separation`` (m) if it is known without
-        rounding.
+        ``separation`` (m) is given if it is known without rounding.
         """
         self.count.energies += 1
         half, gaps, solution = self._half, point.gaps, point.field.solution
         q0_s, pressure, slope = solution.separation, solution.pressure, point.slope
         elastic = self._full_energy + 0.5 * point.field.work - np.pi * q0_s * pressure
         if held is not None:  # p is linear in d, and the energy quadratic
-            (p_rate, s_rate, _), way = held[1].by_prescribed(), held[0] - point.d
+            (p_rate, s_rate, _), way = solution.by_prescribed(), held - point.d
             elastic -= np.pi * s_rate * way * (2 * pressure + p_rate * way)
             pressure, slope = pressure + p_rate * way, math.nan
-            q0_s = held[0] if self.problem.control.is_fixed else q0_s + s_rate * way
+            q0_s = held if self.problem.control.is_fixed else q0_s + s_rate * way
         if separation is None:
             separation = q0_s / self.q0
         mean_stress = pressure * half
@@ -160,17 +155,3 @@ class States:
     def _conjugate(self, state: ContactState) -> float:
         h_max = self.problem.profile.h_max
         return self.problem.control.conjugate(state.separation, state.mean_stress, h_max)
-
-    def jump(
-        self,
-        before: ContactState,
-        after: ContactState,
-        direction: Branch,
-        at_stake: float | None = None,
-    ) -> Jump:
-        """Make the jump between two states; ``at_stake`` in J/m² if it raced, else None."""
-        return Jump.between(
-            before, after, direction, self.period, raced=at_stake is not None,
-            at_stake=at_stake or 0.0,
-            falls_off=self.problem.control.is_load and not after.patches,
-        )  # fmt: skip

@@ -1,25 +1,99 @@
-"""The tables of losses and profiles, from an aggregate."""
+"""The tables of a campaign's report, from an aggregate, and the columns that they share."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.aggregate.cells import Cell, alike
-from adhesis.ensemble.aggregate.companions import difference
+from adhesis.ensemble.aggregate.average import SMALL, Aggregate, AveragedCell, fitted_slope
+from adhesis.ensemble.aggregate.cells import Cell, alike, difference
+from adhesis.ensemble.campaign.tables import Axis
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
-from adhesis.ensemble.quantities import percent, rounded_percent
+from adhesis.ensemble.quantities import UNITS, common_unit, percent, rounded_percent
 from adhesis.ensemble.report import paper
-from adhesis.ensemble.report.tables.key import axis_column, estimated, key_columns
-from adhesis.ensemble.report.tables.table import Table, TableColumn, fixed, make_table, number
+from adhesis.ensemble.report.further_axes import state_sign
+from adhesis.ensemble.report.tables.table import (
+    Format,
+    Table,
+    TableColumn,
+    fixed,
+    make_table,
+    number,
+)
 from adhesis.solver.loading.zero_range import ANY_RANGE, RANGES
+from adhesis.solver.method import BRANCHES
+from adhesis.solver.model.jump import JUMP_KINDS
 from adhesis.solver.model.profile import Array
 from adhesis.solver.values import finite
+
+_SIGNS = {"hurst": "H", "work_of_adhesion": "γ"}
+
+
+def key_columns(data: Aggregate) -> list[TableColumn]:
+    """Return the columns of the cell that a row is about: H, γ, and every further axis."""
+    return [axis_column(axis) for axis in data.campaign.axes]
+
+
+def axis_column(axis: Axis, cell: str = "", suffix: str = "", heading: str = "") -> TableColumn:
+    """Return the column of an axis, for people in the unit of the campaign.
+
+    Of two cells of a row, ``cell`` is the path ("upper."), ``suffix`` and ``heading`` tell them
+    apart.
+    """
+    shown, size = common_unit(axis.name, axis.values)
+    unit = UNITS.get(axis.name, "").replace("²", "^2")
+    name, heading = f"{axis.name}{suffix}", heading or _SIGNS.get(axis.name, axis.name)
+    return TableColumn(
+        f"{name} [{unit}]" if unit else name,
+        f"{cell}at.{axis.name}",
+        f"{heading} ({shown})" if shown else heading,
+        lambda value: f"{value / size:g}",
+    )
+
+
+_HEADINGS = {"std": "", "sem": "s.e.", "ci_low": "95 % from", "ci_high": "to"}
+
+
+def estimated(
+    name: str,
+    parts: str = "mean",
+    heading: str = "",
+    show: Format | None = None,
+    *,
+    of: str = "",
+    unit: str = "",
+    size: float = 1.0,
+    least: bool = False,
+    **options: Any,
+) -> list[TableColumn]:
+    """Return columns of an estimate: "mean sem ci_low", or "value", a mean by the name alone.
+
+    Without a ``heading`` they are for programs. People see multiples of ``size``; with ``least`` no
+    end of an interval below 0. ``of`` is the path to the estimate, by default that of the same name
+    of a cell. ``options`` are those of the columns.
+    """
+    formats = {"sem": number(2, unit=size)}
+    if least:
+        formats["ci_low"] = lambda value: number(unit=size)(value) if value > 0 else "0"
+    columns = []
+    for part in parts.split():
+        attribute = "mean" if part == "value" else part.removeprefix("ci_")
+        columns.append(
+            TableColumn(
+                f"{name}{'' if part == 'value' else f'_{part}'}{unit}",
+                f"{of or f'estimates.{name}'}.{attribute}",
+                heading and _HEADINGS.get(part, heading),
+                formats.get(part, show or number(unit=size)),
+                **options,
+            )
+        )
+        options = {**options, "note": ""}
+    return columns
+
 
 _ALL, _DIFFERENCE = "mean std sem ci_low ci_high", "value sem ci_low ci_high"
 _MILLI: Any = {"unit": " [J/m^2]", "size": 1e-3}
@@ -349,3 +423,99 @@ def works(data: Aggregate) -> Table:
         columns += estimated(name, "ci_low ci_high", **_MILLI)
     columns += estimated("full_contact_energy", "mean", "full contact (mJ/m²)", **_MILLI)
     return make_table("Work of approach and separation", columns, data.cells)
+
+
+def _share(kind: int, cell: AveragedCell) -> float | None:
+    """Return the share of a kind in the drops of a cell; None without any."""
+    drops = float(cell.jumps.energy.sum())
+    return float(cell.jumps.energy[kind]) / drops if drops else None
+
+
+def jumps(data: Aggregate) -> Table:
+    """One row for each cell and kind: how many jumps, and their share of all drops."""
+    rows = [
+        {
+            "at": cell.at,
+            "kind": JUMP_KINDS[k],
+            "scale": "small" if SMALL[k] else "large",
+            "number": float(cell.jumps.number[k]) / cell.done,
+            "energy": float(cell.jumps.energy[k]) / cell.done,
+            "share": _share(k, cell),
+        }
+        for cell in data.cells
+        for k in np.flatnonzero(cell.jumps.number).tolist()
+    ]
+    columns = [
+        *key_columns(data),
+        TableColumn("kind", "kind", "kind"),
+        TableColumn("scale", "scale", "scale"),
+        TableColumn("jumps_per_loop", "number", "jumps a loop", number(3)),
+        TableColumn(
+            "energy_per_loop [J/m^2]", "energy", "drops a loop (mJ/m²)", number(3, unit=1e-3)
+        ),
+        TableColumn("share_of_drops", "share", "share", percent),
+    ]
+    return make_table("Jumps by kind", columns, rows)
+
+
+def shares_by_kind(data: Aggregate) -> Table:
+    """Share of each kind in the drops, one row for each cell: :func:`jumps` at a glance."""
+    found = np.flatnonzero(np.any([cell.jumps.number for cell in data.cells], axis=0)).tolist()
+    kinds = [(k, JUMP_KINDS[k]) for k in found]
+    columns = [TableColumn(kind, partial(_share, k), kind, percent) for k, kind in kinds]
+    title = "Share of the drops by kind of the jump"
+    return make_table(title, [*key_columns(data), *columns], data.cells)
+
+
+def mechanisms(data: Aggregate) -> Table:
+    """Loss by mechanism, largest tension and loss of contact, one row for each cell.
+
+    The largest tension of a loop is reached before the last contact is lost, at another
+    penetration.
+    """
+    columns = [
+        *key_columns(data),
+        *estimated("small_scale_share", "value ci_low ci_high", "small-scale share", percent),
+        *estimated("jump_count", "value", "jumps a loop", number(3)),
+        *estimated("pull_off_stress", "value", "largest tension (kPa)", number(3, unit=1e3)),
+        TableColumn(
+            *("pull_off_stress_sem", "estimates.pull_off_stress.sem", "s.e. (kPa)"),
+            number(2, unit=1e3),
+        ),
+        *estimated("pull_off_penetration", "value", "detached by Δ/h_max", number(3)),
+        *estimated("wall_time", "value", "s a loop", lambda s: f"{float(f'{s:.3g}'):g}"),
+    ]
+    return make_table("Mechanisms and pull-off", columns, data.cells)
+
+
+def slopes(data: Aggregate, branches: Sequence[str] = BRANCHES) -> Table:
+    """Exponent of the deformed surface's spectrum at small wave numbers, state by state."""
+    columns = [
+        *key_columns(data),
+        TableColumn("branch", "branch", "branch"),
+        TableColumn("penetration", "penetration", state_sign(data), fixed(2)),
+        TableColumn("realisations", "realisations", "n"),
+        TableColumn("slope", "slope", "slope", fixed(2)),
+        TableColumn("slope_sem", "error", "s.e.", number(1)),
+        TableColumn("slope_persson", lambda row: -(2 + row["at"]["hurst"]), "-(2+H)", fixed(2)),
+        TableColumn(
+            "slope_profile", lambda row: -(2 * row["at"]["hurst"] + 1), "-(2H+1)", fixed(2)
+        ),
+    ]
+    rows = []
+    for cell in data.cells:
+        for branch in branches:
+            b = BRANCHES.index(branch)
+            for k in np.flatnonzero(cell.fields.in_contact[b]).tolist():
+                slope, error = fitted_slope(cell.plan, cell.fields.psd_displacement[b, k])
+                rows.append(
+                    {
+                        "at": cell.at,
+                        "branch": branch,
+                        "penetration": float(cell.plan.penetration[k]),
+                        "realisations": int(cell.fields.in_contact[b, k]),
+                        "slope": slope,
+                        "error": error,
+                    }
+                )
+    return make_table("Slope of the spectrum of the deformed surface", columns, rows)

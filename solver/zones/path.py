@@ -1,0 +1,207 @@
+"""Follow the path of the method ``zones`` to a prescribed value, and locate its jumps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adhesis.solver.grid.patches import patch_ranges
+from adhesis.solver.method import ContactState, PathError
+from adhesis.solver.model.jump import Branch, Jump
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array
+from adhesis.solver.zones.descent import Descent, Minimum
+
+_FINEST = 1e-3  # of γ, or the accuracy: unit of the next two
+_SMOOTH = 0.1  # of the unit, shared by the range: loss of a step that counts as none
+_NOISE = 0.01  # of the unit: loss of a step by a node that comes into contact or zone
+_LOCATED = 0.3  # of the accuracy times the drop, or of the noise: work within which a jump lies
+_LONGEST = 0.05  # of the range: jumps hide in longer steps
+_NEAREST = 1e-9  # of the range: shortest step
+_WIDEST_EDGE = 0.99  # nodes between an edge and the next free node, at most
+
+
+class Steps:
+    """Steps of one call of ``follow``, with location of the jumps.
+
+    Let L be what a step loses: the fall of the potential W less ∫ Y dx, by stresses and their
+    slopes at both its ends. On a branch L is of fifth order in the step. A step with a larger one
+    is halved until the work |ΔY Δx| within which the jump lies is small beside its drop. A descent
+    on the way to that is ended as soon as W is below what a branch may have.
+    """
+
+    def __init__(self, problem: Problem, descent: Descent, accuracy: float, branch: Branch) -> None:
+        self.problem, self.descent, self.accuracy, self.branch = problem, descent, accuracy, branch
+        self.surface = descent.surface
+        self.states: list[ContactState] = []
+        self.jumps: list[Jump] = []
+        self.error = 0.0
+        self.scale = problem.prescribed_range + problem.attraction_range
+        if problem.control.is_load:
+            self.scale = problem.prescribed_range
+        self.unit = min(accuracy, _FINEST) * problem.work_of_adhesion
+
+    def run(self, here: Minimum, prescribed: float) -> None:
+        """Follow the path from a minimum to x = ``prescribed``, appending states and jumps.
+
+        Raises
+        ------
+        PathError
+            If the contact runs into full contact, or no minimum is found.
+        """
+        control = self.problem.control
+        longest = _LONGEST * self.scale
+        whole = step = float(np.clip(prescribed - here.prescribed, -longest, longest))
+        rate, slope = self._rate(here)
+        least = self.accuracy * self.scale
+        while here.prescribed != prescribed:
+            remaining = prescribed - here.prescribed
+            if abs(step) >= abs(remaining) * (1 - 1e-9):
+                step = remaining
+            target = prescribed if step == remaining else here.prescribed + step
+            divisible = abs(step) > least
+            after = self._descend(here, rate, slope, target, divisible)
+            if after is None:
+                step *= 0.5
+                continue
+            if not (control.is_fixed or after.gap.any()):
+                raise PathError(self.problem.full_contact(target))
+            lost = control.is_load and target > 0 and after.adhesion == 0
+            rate_after, slope_after = (rate, slope) if lost else self._rate(after)
+            change = self._conjugate(after) - self._conjugate(here)
+            loss = here.potential - after.potential
+            loss -= (self._conjugate(here) + 0.5 * change) * step
+            smooth = loss + (slope_after - slope) * step**2 / 12
+            allowed = self.unit * (_SMOOTH * abs(step) / self.scale + _NOISE)
+            within = abs(change * step)
+            begins_or_ends = (after.adhesion == 0) != (here.adhesion == 0)
+            # on a branch on which Y rises or falls the trapezoidal rule is off by half of that
+            if begins_or_ends or max(abs(smooth), loss - 0.5 * within) > allowed:
+                located = _LOCATED * max(self.accuracy * abs(loss), _NOISE * self.unit)
+                if (lost or within > located) and abs(step) > _NEAREST * self.scale:
+                    # the separation at the loss of contact varies as a square root of the load
+                    wanted = 0.0 if lost else abs(step) * located / within
+                    least = min(0.5 * abs(step), max(wanted, _NEAREST * self.scale))
+                    step *= 0.5
+                    continue
+                self._jump(here, after, (slope, slope_after), lost)
+                if lost:
+                    return
+                step, least = whole, self.accuracy * self.scale
+            else:
+                self.states.append(self.state_of(after, slope_after))
+                step = float(np.clip(2 * step, -longest, longest))
+            here, rate, slope = after, rate_after, slope_after
+
+    def _rate(self, here: Minimum) -> tuple[Array, float]:
+        """Return dg/dx and dY/dx; where nothing is attracted the gap follows what is prescribed."""
+        if here.adhesion == 0:
+            moves = not self.problem.control.is_load
+            return np.full(self.surface.n, float(moves)), 0.0
+        return self.descent.rate(here)
+
+    def _conjugate(self, here: Minimum) -> float:
+        return self.problem.control.conjugate(
+            here.separation, here.mean_stress, self.problem.profile.h_max
+        )
+
+    def _descend(
+        self, here: Minimum, rate: Array, slope: float, target: float, divisible: bool
+    ) -> Minimum | None:
+        """Descend at ``target``; None if the step has to be divided."""
+        step = target - here.prescribed
+        bent = 0.5 * slope * step**2
+        least = here.potential - self._conjugate(here) * step - bent
+        least -= 2 * abs(bent) + 2 * self.unit
+
+        def falls(now: Minimum) -> bool:
+            return now.potential < least
+
+        guess = here.gap + step * rate
+        return self.descent.run(guess, target, falls if divisible else None)
+
+    def _jump(self, here: Minimum, after: Minimum, slopes: tuple[float, float], lost: bool) -> None:
+        """Append a jump that lies between two minima, at the prescribed value of the second."""
+        control, h_max = self.problem.control, self.problem.profile.h_max
+        step = after.prescribed - here.prescribed
+        work = self._conjugate(here) * step
+        separation, p = here.separation, here.mean_stress
+        if control.is_load:
+            p = -after.prescribed
+        elif control.is_fixed:
+            separation = after.prescribed
+        else:
+            separation += step
+        held = control.potential(0.0, separation, p, h_max, 1.0)
+        fall = here.elastic + here.adhesion - (here.potential - work - held)
+        before = self.state_of(
+            Minimum(
+                here.gap, after.prescribed, separation, p, here.elastic - fall, here.adhesion,
+                here.potential - work,
+            ),
+            slopes[0],
+        )  # fmt: skip
+        end = self.state_of(after, slopes[1])
+        if lost:
+            end = ContactState.detached(separation)
+        opens = _opens(here.gap, after.gap)
+        self.states += [before, end]
+        if not before.contact_fraction:
+            before = replace(before, edges=np.empty((0, 2)))
+        jump = Jump.between(
+            before, end, self.branch, self.surface.period, opens=opens, falls_off=lost
+        )
+        self.jumps.append(jump)
+        change = 0.0 if lost else self._conjugate(after) - self._conjugate(here)
+        self.error += abs(change * step)
+
+    def state_of(self, here: Minimum, slope: float) -> ContactState:
+        """Make the contact state of a minimum with dY/dx = ``slope``.
+
+        Where nothing touches, zones count as patches.
+        """
+        surface, control = self.surface, self.problem.control
+        if here.adhesion == 0:
+            return ContactState.detached(here.separation)
+        contact = here.gap == 0
+        first, width = patch_ranges(contact)
+        left, right = _beyond(here.gap, first, -1), _beyond(here.gap, first + width - 1, 1)
+        edges = np.column_stack([first - 1 + left, first + width - right])
+        length = float((edges[:, 1] - edges[:, 0]).sum())
+        if not contact.any():
+            first, width = patch_ranges(here.gap < surface.range)
+            edges = np.column_stack([first - 0.5, first + width - 0.5])
+        edges = edges * surface.dx
+        edges += surface.period * ((edges[:, :1] < 0) * 1.0 - (edges[:, :1] >= surface.period))
+        hold = control.potential(
+            0.0, here.separation, here.mean_stress, self.problem.profile.h_max, surface.period
+        )
+        return ContactState(
+            separation=here.separation,
+            edges=edges[np.argsort(edges[:, 0], kind="stable")],
+            mean_stress=here.mean_stress,
+            elastic_energy=here.elastic * surface.period,
+            adhesion_energy=here.adhesion * surface.period,
+            contact_fraction=length / surface.n,
+            tangent=slope,
+            hold_energy=hold,
+            internal=here.gap,
+        )
+
+
+def _beyond(gap: Array, node: NDArray[np.intp], way: int) -> Array:
+    """Distance of edges from the first free node in nodes: the gap rises as its power 3/2."""
+    n = len(gap)
+    near, far = gap[(node + way) % n], gap[(node + 2 * way) % n]
+    ratio = np.cbrt(near / np.maximum(np.maximum(near, far), np.finfo(float).tiny)) ** 2
+    return np.asarray(np.clip(ratio / np.maximum(1 - ratio, 1e-12), 0.0, _WIDEST_EDGE))
+
+
+def _opens(before: Array, after: Array) -> bool:
+    """Whether a gap appears inside a patch: one all of whose nodes, and both beside, touched."""
+    first, width = patch_ranges(after > 0)
+    opened = np.concatenate([[0], np.cumsum(np.tile(before > 0, 3))])
+    n = len(before)
+    return bool(np.any(opened[n + first + width + 1] == opened[n + first - 1]))
