@@ -59,7 +59,7 @@ OPTIONS = (
     "method",
     METHOD,
     ("--accuracy", float, "relative error of the loss (default 1e-3)", {"default": 1e-3}),
-    ("--nodes-per-wave N", int, "for grid"),
+    ("--nodes-per-wave N", int, "for grid and zones"),
     "output",
     ("--json OUT", Path, "states, losses and jumps"),
     ("--csv FILE", Path, "the curve: a row a state, units in the header"),

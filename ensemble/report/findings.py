@@ -108,13 +108,13 @@ def law(data: Aggregate) -> Iterator[str]:
         yield f"Edges advance at γ, and recede at a work of adhesion of {opened}{mean}."
     if material.adhesion_range is not None:
         yield (
-            f"Adhesion has a range of {shown('adhesion_range')}: surfaces touch at that gap, and "
-            "the strength is γ over it."
+            f"Adhesion has a range of {shown('adhesion_range')}: surfaces attract each other "
+            "from that gap on, with the strength of γ over it."
         )
     elif material.opens:
         yield (
-            f"Adhesion has a strength of {shown('strength')}: its range, a gap at which surfaces "
-            "touch, is γ over it."
+            f"Adhesion has a strength of {shown('strength')}: its range, a gap from which on "
+            "surfaces attract each other, is γ over it."
         )
         if any(cell.campaign.material.strength == math.inf for cell in data.cells):
             yield "Where the strength is inf, the range of adhesion is zero."

@@ -336,7 +336,7 @@ def loss_of_trace(
         What is prescribed along the path; without it the separation.
     load_steps : int
         Of the loading branch of each loop.
-    method : {"auto", "sharp", "grid"}
+    method : {"auto", "sharp", "grid", "zones"}
     accuracy : float
         Wanted relative error of the loss of each loop.
     adhesion_range, strength : float, optional

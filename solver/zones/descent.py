@@ -105,7 +105,7 @@ class Descent:
         Raises
         ------
         PathError
-            If there is no minimum within the largest number of steps.
+            If there is no minimum within the largest number of steps, or the energy falls no more.
         """
         here, forces = self._at(self._prescribe(np.maximum(gap, 0.0), x), x)
         for _ in range(_MOST_STEPS):
@@ -130,8 +130,8 @@ class Descent:
                 break
             here, forces = after, forces_after
         raise PathError(
-            f"no minimum of the energy at {x:g} (m, under a load Pa): give more nodes_per_wave, or "
-            "take the method 'sharp'"
+            f"the descent ends at no minimum, at a prescribed {x:g} (in m, under a load in Pa): "
+            "give more nodes_per_wave, or take the method 'sharp'"
         )
 
     def _prescribe(self, gap: Array, x: float) -> Array:
