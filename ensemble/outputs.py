@@ -18,13 +18,10 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 from adhesis.ensemble.errors import InputError, WriteError, one_of, reason, refusal
 from adhesis.ensemble.regular_file import irregular
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Other names of an open descriptor of this process; to rename a file over them would destroy them.
 _DESCRIPTOR = re.compile(r"/dev/(?:(stdin|stdout|stderr)|fd/(\d+))|/proc/self/fd/(\d+)")
@@ -231,17 +228,6 @@ def write_json(path: Path, document: dict[str, Any]) -> None:
     """Write a document whole or not at all (OSError)."""
     with whole_file(path) as stream:
         stream.write((json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
-
-
-def write_netcdf(path: Path, dataset: xr.Dataset) -> None:
-    """Write a dataset as netCDF 4, whole or not at all (OSError).
-
-    It is made in memory: HDF5 reports a full disk when the file is closed, and ends the process
-    with a segmentation fault where the library closes it at exit.
-    """
-    # Released at once: the view of a stream that an error keeps alive is reported at the exit.
-    with memoryview(dataset.to_netcdf(None, engine="h5netcdf")) as data, whole_file(path) as stream:
-        stream.write(data)
 
 
 @contextmanager

@@ -178,7 +178,7 @@ def prepare(
         check_cell(task)
     if again or plan.batches is not None:
         with Writer(path) as writer:
-            writer.reset(again)
+            writer.mark(again, schema.PENDING)
             if plan.batches is not None:
                 spare = np.zeros(status.size, bool)
                 spare[plan.batches.not_needed] = True

@@ -314,7 +314,7 @@ def test_a_merge_takes_a_damaged_row_from_another_file(damage, path, tmp_path):
     assert differences(path, damage.sound) == []
 
 
-def test_a_row_that_a_run_empties_while_it_is_read_is_not_called_damaged(path, monkeypatch):
+def test_a_row_that_a_run_computes_again_while_it_is_read_is_not_called_damaged(path, monkeypatch):
     with h5py.File(path) as file:
         status, loss = (file[name].id.get_offset() for name in ("status", "loss"))
     real, looks = reading.row_checksums, []
