@@ -30,7 +30,7 @@ from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.aggregate.status import read_status
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.results.merge import merge
+from adhesis.ensemble.results.layout import merge
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import PENDING, ROW_DATASETS
 from adhesis.ensemble.results.write import Writer

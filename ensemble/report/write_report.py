@@ -49,11 +49,11 @@ def _older_files(directory: Path) -> list[str]:
 def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], None]) -> None:
     progress("tables")
     # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
-    from adhesis.ensemble.report.curves_dataset import curves_dataset
     from adhesis.ensemble.report.figures.catalogue import sections
     from adhesis.ensemble.report.figures.style import save, style
     from adhesis.ensemble.report.html import html_page
     from adhesis.ensemble.report.markdown_page import write_page
+    from adhesis.ensemble.report.opened import curves_dataset
     from adhesis.ensemble.report.tables import campaign_tables
 
     tables = {

@@ -182,19 +182,17 @@ class Loops:
         priors: dict[Hashable, float] = dict(enumerate(expected))
         tasks = range(self.count)
         self._schedule = Schedule(tasks, dict(enumerate(tasks)), priors, dict.fromkeys(tasks, 0))
-        self._master: Master | None = None
+        self._notes: Mapping[int, Any] = {}  # of the loops that run, as the master has them
 
     @property
     def seconds_left(self) -> float | None:
         """Estimated time to the end, in s; None if nothing is known yet."""
-        in_flight = [] if self._master is None else list(self._master.notes)
-        return self._schedule.seconds_left(in_flight, max(self.processes, 1))
+        return self._schedule.seconds_left(list(self._notes), max(self.processes, 1))
 
     @property
     def running(self) -> dict[str, tuple[str, float]]:
         """By name: the branch and prescribed value reached."""
-        notes = {} if self._master is None else self._master.notes
-        return {self._runs[k].name: note or ("loading", 0.0) for k, note in notes.items()}
+        return {self._runs[k].name: note or ("loading", 0.0) for k, note in self._notes.items()}
 
     def __str__(self) -> str:
         """Return how far they are, as a line."""
@@ -239,6 +237,7 @@ class Loops:
                 channel = started = Processes(self.processes, computing, limits)
                 stack.enter_context(started)
                 self.pids = started.pids
-            self._master = Master(channel, self._schedule, collect, limits, tick)
-            self._master.run()
+            master = Master(channel, self._schedule, collect, limits, tick)
+            self._notes = master.notes
+            master.run()
         return self.done

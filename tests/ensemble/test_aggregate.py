@@ -8,8 +8,8 @@ import pytest
 
 from adhesis.ensemble.aggregate.average import BIN_EDGES, QUANTILES, SMALL, aggregate, fitted_slope
 from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.campaign.precision import estimates, interval, interval_method, untransformed
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.interval import estimates, interval, interval_method, untransformed
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.fields import FieldPlan

@@ -21,7 +21,7 @@ from adhesis.ensemble.report.findings import missing
 from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.results import checksum
 from adhesis.ensemble.results.checksum import write_head
-from adhesis.ensemble.results.merge import merge
+from adhesis.ensemble.results.layout import merge
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, PENDING, ROW_DATASETS
 from adhesis.ensemble.run.session import Options, run_campaign

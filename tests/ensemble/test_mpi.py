@@ -12,8 +12,7 @@ import pytest
 
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.campaign.tasks import Part
-from adhesis.ensemble.results.layout import create
-from adhesis.ensemble.results.merge import merge
+from adhesis.ensemble.results.layout import create, merge
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, PENDING
 from adhesis.ensemble.results.write import Writer

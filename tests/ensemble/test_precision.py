@@ -12,14 +12,15 @@ from adhesis.ensemble.campaign.precision import (
     LEAST,
     MOST_LISTED,
     enough,
+    estimates,
     fewest,
+    interval,
     looks,
     precision,
     precision_lines,
 )
 from adhesis.ensemble.campaign.tables import growth
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.interval import estimates, interval
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.checksum import row_checksums

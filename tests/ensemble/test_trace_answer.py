@@ -32,10 +32,10 @@ from adhesis.ensemble.trace.answer import (
     run_plan,
 )
 from adhesis.ensemble.trace.answer import document as document_of
-from adhesis.ensemble.trace.figures import _tables as tables_of
 from adhesis.ensemble.trace.loops import Loops
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
+from adhesis.ensemble.trace.trace_page import _tables as tables_of
 from adhesis.ensemble.trace.trace_page import page_text, summary
 from adhesis.ensemble.trace.variants import TABLES, Plan, make_plan
 from benchmarks.trace_coverage import case, judged
