@@ -155,7 +155,7 @@ def test_spectra_leave_out_realisations_without_contact(tmp_path):
     assert slope == pytest.approx(-2.8, abs=1e-3)
     with Results(tmp_path / "r.h5") as results:
         first = results.column("field_height", slice(0, 1))[0]
-    np.testing.assert_array_equal(cell.fields.shape.height, first)
+    np.testing.assert_array_equal(cell.fields.shape[0], first)
 
 
 def test_a_fitted_slope_knows_its_error():

@@ -1,6 +1,7 @@
 """Realisations in batches until the mean is known well enough: the rule, and its runs."""
 
 import json
+import math
 import shutil
 
 import numpy as np
@@ -313,7 +314,7 @@ def test_the_report_has_the_interval_of_the_table_and_the_verdict_of_the_rule(
 def test_failures_count_as_looked_at_and_may_be_computed_again(tmp_path):
     path, out = tmp_path / "c.toml", tmp_path / "r.h5"
     path.write_text(text())
-    summary = run_file(path, out, fake="fail=*:*:3", max_failures=None)
+    summary = run_file(path, out, fake="fail=*:*:3", max_failures=math.inf)
     assert summary.failed == 2
     with Results(out) as results:
         assert np.sum(results.status() == FAILED) == 2
