@@ -68,10 +68,7 @@ def execute(args: argparse.Namespace) -> int:
         if wanted:
             (loop,) = results
             assert isinstance(loop, LoopResult)  # a path has no fields
-            if at_stresses:
-                fields = record.fields_at_stresses(loop, wanted, nodes)
-            else:
-                fields = record.fields_at_penetrations(loop, method, wanted, nodes)
+            fields = record.fields_of(loop, method, wanted, at_stresses, nodes)
     except PathError as error:
         print(f"adhesis loop: {in_options(str(error), args)}", file=sys.stderr)
         return SOME_FAILED

@@ -52,31 +52,32 @@ class DiskFile(io.FileIO):
         if self._error is not None:
             raise self._error
 
+    @contextmanager
+    def _kept(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            self._error = self._error or error
+
     def close(self) -> None:
         """Close the file, after h5py has closed its own."""
-        try:
+        with self._kept():  # some disks report only now that they are full
             super().close()
-        except OSError as error:  # some disks report only now that they are full
-            self._error = self._error or error
 
     def write(self, data: Any, /) -> int:
         """Write here."""
         rest = memoryview(data).cast("B")
         length = rest.nbytes
-        try:
+        with self._kept():
             while rest.nbytes:
                 rest = rest[super().write(rest) :]
-        except OSError as error:
-            self._error = self._error or error
         return length
 
     def truncate(self, size: int | None = None, /) -> int:
         """Set the length of the file."""
-        try:
+        with self._kept():
             return super().truncate(size)
-        except OSError as error:
-            self._error = self._error or error
-            return size or 0
+        return size or 0
 
 
 @contextmanager

@@ -167,7 +167,7 @@ class Loops:
     """Loops of a plan in processes, the longest first; 0 processes run them in this one.
 
     ``seconds`` are expected, by name. ``done`` holds the result by name, the error text of a failed
-    loop; ``pids`` the ids of the processes.
+    loop.
     """
 
     def __init__(
@@ -177,7 +177,6 @@ class Loops:
         self.count = len(self._runs)
         self.processes = min(processes, self.count)
         self.done: dict[str, Result | str] = {}
-        self.pids: list[int] = []
         expected = [(seconds or {}).get(run.name, 1.0) for run in self._runs]
         priors: dict[Hashable, float] = dict(enumerate(expected))
         tasks = range(self.count)
@@ -234,9 +233,7 @@ class Loops:
             if self.processes == 0:
                 channel = OwnWorker(computing, limits)
             else:
-                channel = started = Processes(self.processes, computing, limits)
-                stack.enter_context(started)
-                self.pids = started.pids
+                channel = stack.enter_context(Processes(self.processes, computing, limits))
             master = Master(channel, self._schedule, collect, limits, tick)
             self._notes = master.notes
             master.run()
