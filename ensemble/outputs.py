@@ -20,7 +20,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
-from adhesis.ensemble.errors import InputError, WriteError, one_of, reason, refusal
+from adhesis.ensemble.errors import InputError, WriteError, reason, refusal
 from adhesis.ensemble.regular_file import irregular
 
 # Other names of an open descriptor of this process; to rename a file over them would destroy them.
@@ -86,7 +86,8 @@ def check_outputs(outputs: Mapping[str, Path], inputs: Mapping[str, Path]) -> No
 def check_ending(option: str, path: Path, *endings: str) -> None:
     """Refuse the name of a file with another ending, in small letters or capitals (InputError)."""
     if path.suffix.lower() not in endings:
-        raise InputError(f"{option} is {path}: the name must end in {one_of(endings)}")
+        names = " or ".join(", ".join(endings).rsplit(", ", 1))
+        raise InputError(f"{option} is {path}: the name must end in {names}")
 
 
 def check_output_folder(
