@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from adhesis.ensemble.escape import shell_word
-from adhesis.ensemble.outputs import check_ending, write_new
+from adhesis.ensemble.files import check_ending, write_new
 
 EXAMPLES = ("adhesis new my.toml", "adhesis new study/first.toml")
 # The campaign that runs as it is: values as TOML spells them.

@@ -30,8 +30,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.files import check_ending, check_outputs, whole_file
 from adhesis.ensemble.loop.record import Result
-from adhesis.ensemble.outputs import check_ending, check_outputs, whole_file
 from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, new_figure, style
 from adhesis.solver import checks
 from adhesis.solver.checks import Bounds, counted, function, whole

@@ -24,10 +24,9 @@ import xarray as xr
 
 from adhesis._version import __version__
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.files import check_ending, check_outputs, open_regular, whole_file
 from adhesis.ensemble.loop.record import Result
-from adhesis.ensemble.outputs import check_ending, check_outputs, whole_file
 from adhesis.ensemble.quantities import units_under, with_units
-from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver import checks
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import MinorLoop, PathResult

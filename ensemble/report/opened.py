@@ -9,10 +9,11 @@ from __future__ import annotations
 import inspect
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -117,7 +118,7 @@ class Plots:
         return self._draw(partial(along, axes[name]), ax)
 
 
-class CampaignResults:
+class CampaignResults(AbstractContextManager["CampaignResults"]):
     """Results of a campaign, finished or not; made by :func:`adhesis.open`.
 
     Parameters
@@ -162,9 +163,6 @@ class CampaignResults:
         if schema.DAMAGED in status:
             self._counts["damaged"] = int(np.sum(status == schema.DAMAGED))
         self.plot = Plots(self)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         """Forget what was read; the file itself is closed after each access anyway."""

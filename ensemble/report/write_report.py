@@ -7,7 +7,7 @@ from pathlib import Path
 
 from adhesis.ensemble.aggregate.average import Aggregate, aggregate
 from adhesis.ensemble.escape import printable
-from adhesis.ensemble.outputs import Writing, staged_folder
+from adhesis.ensemble.files import Writing, staged_folder
 
 
 def write_report(

@@ -29,7 +29,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.regular_file import open_regular
+from adhesis.ensemble.files import open_regular
 from adhesis.ensemble.results.schema import CHECKSUM, ROW_DATASETS, STATUS
 from adhesis.ensemble.task.dataset import KEPT, Dataset
 

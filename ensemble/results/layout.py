@@ -25,9 +25,8 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.tables import Campaign, growth
 from adhesis.ensemble.campaign.tasks import WHOLE, Part
 from adhesis.ensemble.errors import InputError, parameter, reason, refusal
-from adhesis.ensemble.outputs import target_of
+from adhesis.ensemble.files import irregular, target_of
 from adhesis.ensemble.quantities import bytes_text
-from adhesis.ensemble.regular_file import irregular
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import reserve_head, write_head
 from adhesis.ensemble.results.read import Results

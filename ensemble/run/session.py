@@ -19,7 +19,7 @@ from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task, Tasks
 from adhesis.ensemble.errors import WriteError, parameter
-from adhesis.ensemble.outputs import target_of
+from adhesis.ensemble.files import target_of
 from adhesis.ensemble.quantities import duration
 from adhesis.ensemble.reporter import Display
 from adhesis.ensemble.results.read import Results
