@@ -247,8 +247,7 @@ class Batches:
         for task, rows in campaign.tasks().by_cell():
             factor = float(task.work_of_adhesion > 0)
             self._cells.append(_Cell(rows, factor * values[rows], known[rows], factor))
-        for cell in self._cells:
-            self._advance(cell)
+            self._advance(self._cells[-1])
 
     @property
     def to_do(self) -> list[int]:
