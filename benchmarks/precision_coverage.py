@@ -27,8 +27,7 @@ from scipy.special import stdtrit
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from adhesis.ensemble.campaign.precision import enough, looks, precision
-from adhesis.ensemble.interval import interval
+from adhesis.ensemble.campaign.precision import enough, interval, looks, precision
 
 STUDY = Path(__file__).resolve().parent.parent / "study" / "data" / "loops.csv"
 FEWEST_OF_STUDY = 120

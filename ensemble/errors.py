@@ -6,7 +6,7 @@ import errno
 import os
 import re
 import resource
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
@@ -20,12 +20,9 @@ class _Printable(Exception):
         return printable(super().__str__())
 
 
-_LONGEST = 80  # characters of a value that a message shows
-
-
-def quoted(text: str) -> str:
-    """Return the repr of a text, shortened for a message."""
-    return repr(text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…")
+def quoted(text: str, longest: int = 80) -> str:
+    """Return the repr of a text, of which a message shows so many characters."""
+    return repr(text if len(text) <= longest else f"{text[:longest]}…")
 
 
 def reason(error: Exception) -> str:
@@ -33,11 +30,6 @@ def reason(error: Exception) -> str:
     if found := re.search(r"error message = '([^']*)'", str(error)):
         return found[1]
     return getattr(error, "strerror", None) or " ".join(str(error).split()) or type(error).__name__
-
-
-def one_of(names: Sequence[str]) -> str:
-    """Join alternatives: ".png, .pdf or .svg"."""
-    return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 class InputError(_Printable, ValueError):

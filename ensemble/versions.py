@@ -13,8 +13,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from adhesis.ensemble.files import open_regular
 from adhesis.ensemble.quantities import units_of
-from adhesis.ensemble.regular_file import open_regular
 
 _PACKAGES = ("adhesis", "numpy", "scipy", "pyfftw", "h5py", "mpi4py")
 

@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.interval import interval
+from adhesis.ensemble.campaign.precision import interval
 from study import monotone
 from study.data import Array, Rows, Study
 

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from adhesis.ensemble.interval import interval
+from adhesis.ensemble.campaign.precision import interval
 from adhesis.ensemble.report.figures.style import MM, TWO_COLUMNS, new_figure, style
 from adhesis.ensemble.report.paper import TABLE_1
 from study import amplitude, jumps, monotone

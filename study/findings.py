@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adhesis.ensemble.interval import interval
+from adhesis.ensemble.campaign.precision import interval
 from adhesis.ensemble.report.paper import TABLE_1
 from study import amplitude, monotone
 from study.data import Study

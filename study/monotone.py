@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import stdtr
 
-from adhesis.ensemble.interval import interval
+from adhesis.ensemble.campaign.precision import interval
 from study.data import Array, Study, aligned
 
 # Error probability of a step in one direction. The plan said 0.05; both directions are looked at.

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from adhesis.ensemble.interval import interval
+from adhesis.ensemble.campaign.precision import interval
 from study import amplitude, jumps, monotone
 from study.data import Array, Study, aligned
 from study.readings import Losses, at_turns

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from adhesis.ensemble.interval import interval
+from adhesis.ensemble.campaign.precision import interval
 from study.data import Array
 
 Table = tuple[list[str], list[list[str]]]

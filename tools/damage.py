@@ -30,9 +30,9 @@ from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.aggregate.status import read_status
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.results.merge import merge
+from adhesis.ensemble.results.layout import merge
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import ROW_DATASETS
+from adhesis.ensemble.results.schema import PENDING, ROW_DATASETS
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import adhesis_here, differences, write_campaign
@@ -128,9 +128,11 @@ class Damage:
     def _answer(self, without: tuple[int, ...]) -> dict[str, Any]:
         """Return what the commands give for the sound file with some rows pending."""
         path = self.folder / f"answer{'-'.join(map(str, without))}.h5"
-        shutil.copy(self.sound, path)
-        with Writer(path) as writer:
-            writer.reset(without)
+        marked = path.with_suffix(".marked.h5")
+        shutil.copy(self.sound, marked)
+        with Writer(marked) as writer:
+            writer.mark(without, PENDING)
+        merge([marked], path)  # in which pending rows hold nothing
         source = path if without else self.sound
         return {"status": _status(source), "averages": _averages(source), "path": path}
 

@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from adhesis import HalfSpace, LoopResult, Problem, make_method, run_loop, self_affine_profile
-from adhesis.ensemble.loop.film import Scene, Scenes, scenes_of
+from adhesis.ensemble.loop.film import Film, Scene
 from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, MM, TWO_COLUMNS, style
 
 COLOURS = {"loading": "#0072B2", "unloading": "#D55E00"}
@@ -36,9 +36,9 @@ def compute() -> LoopResult:
     return run_loop(make_method("auto", problem), max_penetration=0.9, load_steps=40)
 
 
-def scene_at(scenes: Scenes, loop: LoopResult, branch: str, penetration: float) -> Scene:
+def scene_at(film: Film, loop: LoopResult, branch: str, penetration: float) -> Scene:
     """Return the scene of a branch that is nearest to a penetration."""
-    of_branch = [scene for scene in scenes.scenes if loop.branch[scene.state] == branch]
+    of_branch = [scene for scene in film.scenes if loop.branch[scene.state] == branch]
     return min(of_branch, key=lambda s: abs(loop.penetration[s.state] - penetration))
 
 
@@ -81,9 +81,9 @@ def draw_curves(stress: Axes, contact: Axes, loop: LoopResult, points: dict[str,
     )
 
 
-def draw_contact(axes: Axes, scenes: Scenes, scene: Scene, top: float) -> None:
+def draw_contact(axes: Axes, film: Film, scene: Scene, top: float) -> None:
     """Draw the elastic body over the rigid profile."""
-    x, height, surface = 1e3 * scenes.x, 1e6 * scenes.height, 1e6 * scene.surface
+    x, height, surface = 1e3 * film.x, 1e6 * film.height, 1e6 * scene.surface
     axes.fill_between(x, height, height.min() - 0.5, color=RIGID, lw=0)
     axes.fill_between(x, surface, top, color=BODY, lw=0)
     axes.plot(x, surface, color=COLOURS["loading"], lw=0.8)
@@ -96,8 +96,8 @@ def draw_contact(axes: Axes, scenes: Scenes, scene: Scene, top: float) -> None:
 
 def draw(loop: LoopResult, path: Path) -> None:
     """Draw stress and contact fraction above, the three contacts below."""
-    scenes = scenes_of(loop, 200)
-    points = {name: scene_at(scenes, loop, *point) for name, point in POINTS.items()}
+    film = Film(loop, 200)
+    points = {name: scene_at(film, loop, *point) for name, point in POINTS.items()}
     top = 1e6 * max(float(scene.surface.max()) for scene in points.values()) + 1.5
     with style():
         figure = plt.figure(figsize=(TWO_COLUMNS, 108 * MM))
@@ -107,7 +107,7 @@ def draw(loop: LoopResult, path: Path) -> None:
         first: Axes | None = None
         for k, (name, scene) in enumerate(points.items()):
             axes = figure.add_subplot(grid[1, 2 * k : 2 * k + 2], sharey=first)
-            draw_contact(axes, scenes, scene, top)
+            draw_contact(axes, film, scene, top)
             depth = loop.penetration[scene.state]
             patches = len(loop.contact_states[scene.state].edges)
             several = "patch" if patches == 1 else "patches"

@@ -97,16 +97,6 @@ def average_curves(
 
 
 @dataclass(frozen=True, eq=False)
-class DeformedShape:
-    """Fields of one realisation."""
-
-    height: Array  # shape (nodes,); rigid profile h in m
-    # Shape (2, penetrations, nodes); deformed surface v in m, loading and unloading; NaN where
-    # there is no contact
-    displacement: Array
-
-
-@dataclass(frozen=True, eq=False)
 class FieldStatistics:
     """Averages of one cell; NaN without finished tasks.
 
@@ -120,8 +110,10 @@ class FieldStatistics:
     gap_density: Array  # shape (2, penetrations, gap bins)
     # Shape (2, penetrations); number of realisations averaged in the last two
     in_contact: NDArray[np.int64]
-    # Of the first finished realisation whose fields are stored
-    shape: DeformedShape | None
+    # Of the first finished realisation whose fields are stored: rigid profile h in m, shape
+    # (nodes,), and deformed surface v in m on loading and unloading, shape (2, penetrations,
+    # nodes), NaN where there is no contact
+    shape: tuple[Array, Array] | None
 
 
 def average_fields(
@@ -130,10 +122,10 @@ def average_fields(
     """Average the rows of a cell; ``kept`` are the rows of the file that keep their fields."""
     averages = {name: _average(results, name, rows) for name in _AVERAGED}
     slots = np.flatnonzero(np.isin(kept, rows))[:1]
-    shape = [results.column(name, slots).astype(float) for name in _OF_SHAPE]
+    height, surface = (results.column(name, slots).astype(float) for name in _OF_SHAPE)
     return FieldStatistics(
         in_contact=averages["psd_displacement"][1],
-        shape=DeformedShape(*(values[0] for values in shape)) if slots.size else None,
+        shape=(height[0], surface[0]) if slots.size else None,
         **{name: mean for name, (mean, _) in averages.items()},
     )
 

@@ -17,12 +17,11 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.campaign.precision import Precision, precision
+from adhesis.ensemble.campaign.precision import Estimate, Precision, estimates, precision
 from adhesis.ensemble.campaign.rules import shown
 from adhesis.ensemble.campaign.tables import Axis, Campaign, differing
 from adhesis.ensemble.campaign.tasks import name_at
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING
 from adhesis.ensemble.task.doubt import beyond_zero_range, doubtful

@@ -22,9 +22,9 @@ from adhesis.ensemble.aggregate.cells import (
     loops_beyond_zero_range,
     read_cells,
 )
+from adhesis.ensemble.campaign.precision import estimates
 from adhesis.ensemble.campaign.tasks import WHOLE, Tasks
 from adhesis.ensemble.escape import one_line, printable, shell_word
-from adhesis.ensemble.interval import estimates
 from adhesis.ensemble.quantities import UNITS, with_error
 from adhesis.ensemble.results.read import Results, mixture, named_rows
 from adhesis.ensemble.results.schema import FAILED, axis_datasets

@@ -49,11 +49,6 @@ class Scene:
     exact_loss: float | None = None  # in J/m² of nominal area, if it is known in closed form
 
 
-def _one_wave() -> Problem:
-    """A cos(q0 x)."""
-    return Problem(single_wave(_SHALLOW, _PERIOD), HALF_SPACE, _EXACT.work_of_adhesion)
-
-
 def _two_waves(work_of_adhesion: float) -> Problem:
     """A cos(q0 x) with a ripple."""
     waves = np.zeros(_RIPPLE_HARMONIC + 1, dtype=np.complex128)
@@ -73,7 +68,7 @@ def _rough(work_of_adhesion: float, n0: int, ratio: int) -> Problem:
 ONE_WAVE = Scene(
     name="one-wave",
     title="one wave, α = 0.2",
-    problem=_one_wave,
+    problem=partial(Problem, single_wave(_SHALLOW, _PERIOD), HALF_SPACE, _EXACT.work_of_adhesion),
     max_penetration=0.5,
     load_steps=10,
     # The wave is the whole profile: its contact of 0.18 λ needs many nodes.

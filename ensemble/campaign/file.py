@@ -18,7 +18,7 @@ from typing import Any
 from adhesis.ensemble.campaign.rules import list_of, number_in, shown
 from adhesis.ensemble.campaign.tables import KEYS, TABLES, Campaign, SweepTable, Table
 from adhesis.ensemble.errors import InputError, quoted
-from adhesis.ensemble.regular_file import open_regular
+from adhesis.ensemble.files import open_regular
 from adhesis.solver.checks import MAX_PENETRATION, MOST_WAVES, at_least
 from adhesis.solver.model.pattern import stripes_of
 from adhesis.solver.model.problem import check_slope

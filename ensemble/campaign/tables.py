@@ -11,7 +11,7 @@ import math
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from functools import cached_property
 from itertools import chain, product
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -272,8 +272,6 @@ KEYS: dict[str, Field[Any]] = {
 """Every key ("cycle.load_steps") with its rule, meaning and default."""
 # Those that may have several values, in the order of the axes; H and γ always are axes.
 _AXES = (*_SWEPT, *(key for key, entry in KEYS.items() if entry.metadata["axis"]))
-Value = float
-"""A value on an axis: a float, or an int where the key is a whole number."""
 
 
 @dataclass(frozen=True)
@@ -282,8 +280,9 @@ class Axis:
 
     table: str  # "profile"
     name: str  # "ratio"
-    # As they are combined: ascending, or, where keys vary together, in the order of the first
-    values: tuple[Value, ...]
+    # As they are combined: ascending, or, where keys vary together, in the order of the first; ints
+    # where the key is a whole number
+    values: tuple[float, ...]
     unit: str
     meaning: str
 
@@ -309,7 +308,7 @@ class Campaign:
     solver: SolverTable
     output: OutputTable
     stop: StopTable = StopTable()
-    lists: dict[str, tuple[Value, ...]] = field(default_factory=dict)
+    lists: dict[str, tuple[float, ...]] = field(default_factory=dict)
     text: str = field(default="", compare=False, repr=False)
 
     @cached_property
@@ -341,16 +340,15 @@ class Campaign:
         return tuple(found[key] for key in _AXES if key in found)
 
     @cached_property
-    def cells(self) -> list[tuple[Value, ...]]:
+    def cells(self) -> list[tuple[float, ...]]:
         """Values on the axes of every cell, in the order of the rows of a results file.
 
         They are all combinations of the groups, the last one varying fastest.
         """
-        rows = [list(zip(*(axis.values for axis in group), strict=True)) for group in self._groups]
+        rows = (zip(*(axis.values for axis in group), strict=True) for group in self._groups)
         keys = [axis.key for group in self._groups for axis in group]
         place = [keys.index(axis.key) for axis in self.axes]
-        flat = (list(chain.from_iterable(parts)) for parts in product(*rows))
-        return [tuple(values[i] for i in place) for values in flat]
+        return [itemgetter(*place)([*chain(*parts)]) for parts in product(*rows)]
 
     @cached_property
     def finest_harmonic(self) -> int:
@@ -437,7 +435,7 @@ class Campaign:
         if part == WHOLE or self._turning is None:
             return part.rows(self.task_count)
         branches = np.arange(self.task_count).reshape(-1, self.realisations)
-        first: dict[tuple[Value, ...], int] = {}
+        first: dict[tuple[float, ...], int] = {}
         turn = [axis.name for axis in self.axes].index(self._turning.name)
         for number, cell in enumerate(self.cells):
             rest = cell[:turn] + cell[turn + 1 :]

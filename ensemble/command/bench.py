@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 from adhesis.ensemble.command.parser import within
-from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
+from adhesis.ensemble.files import Writing, check_output_folder, staged_folder
 from adhesis.ensemble.reporter import bar
 
 _DEFAULT = Path("out/benchmark")

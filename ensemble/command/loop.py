@@ -17,9 +17,9 @@ from adhesis.ensemble.command.options import in_options
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
+from adhesis.ensemble.files import Writing, check_ending, check_outputs, whole_file, write_json
 from adhesis.ensemble.loop import record
 from adhesis.ensemble.loop.heights import heights_warning, read_heights
-from adhesis.ensemble.outputs import Writing, check_ending, check_outputs, whole_file, write_json
 from adhesis.ensemble.trace.loops import Cycle
 from adhesis.ensemble.versions import input_record, provenance
 from adhesis.solver import checks
@@ -68,10 +68,7 @@ def execute(args: argparse.Namespace) -> int:
         if wanted:
             (loop,) = results
             assert isinstance(loop, LoopResult)  # a path has no fields
-            if at_stresses:
-                fields = record.fields_at_stresses(loop, wanted, nodes)
-            else:
-                fields = record.fields_at_penetrations(loop, method, wanted, nodes)
+            fields = record.fields_of(loop, method, wanted, at_stresses, nodes)
     except PathError as error:
         print(f"adhesis loop: {in_options(str(error), args)}", file=sys.stderr)
         return SOME_FAILED

@@ -156,9 +156,9 @@ def _interrupts(name: str) -> Iterator[None]:
             come_again()
             return
         if any(f.f_globals.get("__name__") == "importlib._bootstrap" for f in frames):
-            outputs = sys.modules.get("adhesis.ensemble.outputs")
-            if outputs is not None:
-                outputs.remove_unfinished()
+            files = sys.modules.get("adhesis.ensemble.files")
+            if files is not None:
+                files.remove_unfinished()
             signal.signal(number, signal.SIG_DFL)
             signal.raise_signal(number)
         if number == signal.SIGINT:

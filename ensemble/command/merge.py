@@ -23,8 +23,7 @@ OPTIONS = (
 
 def execute(args: argparse.Namespace) -> None:
     """Merge."""
-    from adhesis.ensemble.results.layout import check_results_file
-    from adhesis.ensemble.results.merge import merge
+    from adhesis.ensemble.results.layout import check_results_file, merge
     from adhesis.ensemble.run.lock import RunLock
     from adhesis.solver.checks import counted
 

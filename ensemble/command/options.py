@@ -19,7 +19,7 @@ from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
-from adhesis.solver.model.pattern import AdhesionPattern, stripes_of
+from adhesis.solver.model.pattern import stripes_of
 
 _TURNS = ("max_penetration", "max_stress", "preload")
 _OF_CYCLE = (
@@ -33,10 +33,14 @@ def settings_of(args: argparse.Namespace, half_space: HalfSpace) -> dict[str, An
 
     A path has its turning points in order; loops have theirs as they are given.
     """
-    control = control_of(args, half_space)
+    refuse_several(args, "stiffness", "layer")
+    stiffness = math.inf if args.stiffness is None else args.stiffness
+    control = Control(stiffness if args.layer is None else half_space.layer_stiffness(args.layer))
     is_path = getattr(args, "path", None) is not None
     turns = {"turning_points": _path(args)} if is_path else turns_of(args, control)
-    pattern = pattern_of(args)
+    names = {"count": "stripes", "amplitude": "stripe_amplitude", "phase": "stripe_phase"}
+    with refused_as_input(vars(args), **names):
+        pattern = stripes_of(args.stripes, args.stripe_amplitude, args.stripe_phase)
     settings = {name: getattr(args, name) for name in _OF_CYCLE}
     return {"half_space": half_space, "control": control, "pattern": pattern, **turns, **settings}
 
@@ -104,17 +108,6 @@ def _distinct(
     return points
 
 
-def control_of(args: argparse.Namespace, half_space: HalfSpace) -> Control:
-    """Read the control: a fixed separation, a stiffness, that of a layer, or a load.
-
-    InputError if both a stiffness and a layer are given, ValueError if one breaks its rule.
-    """
-    refuse_several(args, "stiffness", "layer")
-    if args.layer is not None:
-        return Control(half_space.layer_stiffness(args.layer))
-    return Control(math.inf if args.stiffness is None else args.stiffness)
-
-
 def in_options(text: str, args: argparse.Namespace) -> str:
     """Return a message on a path with the options that prescribe a stiffness or the separation."""
     option = "--stiffness" if args.layer is None else "--layer"
@@ -173,13 +166,6 @@ def _range(text: str) -> tuple[float, float]:
     except InputError as error:
         raise InputError(f"--exclude is {quoted(text)}: a position of it {error}") from None
     return begin, end
-
-
-def pattern_of(args: argparse.Namespace) -> AdhesionPattern | None:
-    """Make the stripes of the options."""
-    names = {"count": "stripes", "amplitude": "stripe_amplitude", "phase": "stripe_phase"}
-    with refused_as_input(vars(args), **names):
-        return stripes_of(args.stripes, args.stripe_amplitude, args.stripe_phase)
 
 
 def what_was_read(prepared: Prepared) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adhesis.ensemble.outputs import check_output_folder
+from adhesis.ensemble.files import check_output_folder
 from adhesis.ensemble.reporter import bar
 
 EXAMPLES = (

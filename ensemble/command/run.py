@@ -10,6 +10,7 @@ resume.
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import time
 from pathlib import Path
@@ -131,7 +132,7 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
     options = Options(
         part=Part.parse(args.part) if args.part else WHOLE,
         redo=_selection(args),
-        max_failures=args.max_failures or None,
+        max_failures=args.max_failures or math.inf,
         deadline=deadline(parse_duration(args.walltime) if args.walltime else None, started),
         patience=args.patience,
         processes=(args.ranks or 1) - 1,
@@ -144,8 +145,7 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
     summary = run_campaign(campaign, path, comm, options, log, engine)
     if comm.rank == 0:
         _report_end(campaign, path, summary, _again(args))
-    too_many = options.max_failures is not None and summary.failed_now >= options.max_failures
-    if summary.pending and not too_many:
+    if summary.pending and summary.failed_now < options.max_failures:
         return exit_codes.RESUME
     return exit_codes.SOME_FAILED if summary.failed else exit_codes.DONE
 

@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 
 from adhesis.ensemble.escape import shell_word
-from adhesis.ensemble.outputs import write_new
+from adhesis.ensemble.files import write_new
 
 EXAMPLES = ("adhesis sample trace.csv", "adhesis sample data/stylus.csv")
 _POINTS, _STEP = 1001, 1e-6  # m

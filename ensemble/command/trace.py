@@ -13,7 +13,7 @@ from adhesis.ensemble.command.options import (
 )
 from adhesis.ensemble.errors import InputError, refused_as_input
 from adhesis.ensemble.exit_codes import SOME_FAILED
-from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
+from adhesis.ensemble.files import Writing, check_output_folder, staged_folder, write_json
 from adhesis.ensemble.quantities import WORK_OF_ADHESION, read_list
 from adhesis.ensemble.trace.answer import (
     FIGURE_FILES,

@@ -30,8 +30,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.files import check_ending, check_outputs, whole_file
 from adhesis.ensemble.loop.record import Result
-from adhesis.ensemble.outputs import check_ending, check_outputs, whole_file
 from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, new_figure, style
 from adhesis.solver import checks
 from adhesis.solver.checks import Bounds, counted, function, whole
@@ -70,53 +70,6 @@ class Scene:
     caption: str  # the state in numbers
     announcement: str  # the jumps since the frame before; empty without any
     is_notable: bool  # whether those jumps lose a hundredth of all drops or more
-
-
-@dataclass(frozen=True)
-class Scenes:
-    """All frames of a film."""
-
-    x: Array  # positions in m from 0 to the period, both included, shape (nodes,)
-    height: Array  # of the rigid profile there, in m
-    scenes: list[Scene]  # in the order of the path
-    jumps_shown: int  # jumps that have a frame before and one after them
-
-
-def scenes_of(
-    result: Result, frames: int, progress: Callable[[int, int], None] | None = None
-) -> Scenes:
-    """Compute the frames of a result: evenly spaced ones, and on top those of jumps.
-
-    ``progress`` is called with the numbers of frames done and in all. ValueError if ``frames`` is
-    out of range, or the result holds no contact states.
-    """
-    frames = whole("frames", frames, _FRAMES)
-    function("progress", progress)
-    if not result.contact_states or result.new_method is None:
-        raise ValueError(
-            "this result holds no contact states, as it was read from a file: run the loop again "
-            "to film it"
-        )
-    method = result.new_method()
-    profile = result.problem.profile
-    x = np.linspace(0.0, profile.period, _NODES)
-    height = profile.at(x)
-    places = result.states_before_jumps()
-    chosen, shown = _chosen(result, places, frames)
-    scenes = []
-    last = -1
-    for done, index in enumerate(chosen, 1):
-        state = result.contact_states[index]
-        since = [j for j, p in zip(result.jumps, places, strict=True) if last <= p < index]
-        before = sum(p < index for p in places)
-        shapes = _surface(method, state, x, height), _patches(state, profile.period)
-        texts = _caption(result, index, before), _announcement(since)
-        is_notable = _drop(since) > 0.01 * _drop(result.jumps)
-        scenes.append(Scene(index, *shapes, *texts, is_notable))
-        last = index
-        if progress is not None:
-            progress(done, len(chosen))
-    return Scenes(x, height, scenes, shown)
 
 
 def _chosen(result: Result, places: Sequence[int], frames: int) -> tuple[list[int], int]:
@@ -200,21 +153,57 @@ def check_film(name: str, path: str | os.PathLike[str]) -> Path:
 class Film:
     """A loop as a film; made by :meth:`adhesis.LoopResult.film`, shown by a notebook.
 
+    It has evenly spaced frames, and on top those of jumps.
+
     Parameters
     ----------
     result : LoopResult or PathResult
-    scenes : Scenes
+    frames : int
+    progress : callable, optional
+        Called with the numbers of frames computed so far, and of all.
+
+    Raises
+    ------
+    ValueError
+        If ``frames`` is out of range, or the result holds no contact states.
     """
 
-    def __init__(self, result: Result, scenes: Scenes) -> None:
-        self._result, self._scenes = result, scenes
+    def __init__(
+        self, result: Result, frames: int, progress: Callable[[int, int], None] | None = None
+    ) -> None:
+        frames = whole("frames", frames, _FRAMES)
+        function("progress", progress)
+        if not result.contact_states or result.new_method is None:
+            raise ValueError(
+                "this result holds no contact states, as it was read from a file: run the loop "
+                "again to film it"
+            )
+        self.result, method, profile = result, result.new_method(), result.problem.profile
+        self.x = np.linspace(0.0, profile.period, _NODES)  # in m, both ends included
+        self.height = profile.at(self.x)  # of the rigid profile there, in m
+        self.scenes: list[Scene] = []  # in the order of the path
+        places = result.states_before_jumps()
+        # jumps_shown: number of jumps that have a frame before and one after them
+        chosen, self.jumps_shown = _chosen(result, places, frames)
+        last = -1
+        for done, index in enumerate(chosen, 1):
+            state = result.contact_states[index]
+            since = [j for j, p in zip(result.jumps, places, strict=True) if last <= p < index]
+            before = sum(p < index for p in places)
+            shapes = _surface(method, state, self.x, self.height), _patches(state, profile.period)
+            texts = _caption(result, index, before), _announcement(since)
+            is_notable = _drop(since) > 0.01 * _drop(result.jumps)
+            self.scenes.append(Scene(index, *shapes, *texts, is_notable))
+            last = index
+            if progress is not None:
+                progress(done, len(chosen))
 
     def __repr__(self) -> str:
-        return f"<Film: {len(self)} frames, {counted(len(self._result.jumps), 'jump')}>"
+        return f"<Film: {len(self)} frames, {counted(len(self.result.jumps), 'jump')}>"
 
     def __len__(self) -> int:
         """Number of frames."""
-        return len(self._scenes.scenes)
+        return len(self.scenes)
 
     def _repr_html_(self) -> str:
         """Return the page in a frame of its own, for notebooks."""
@@ -258,20 +247,19 @@ class Film:
     @cached_property
     def page(self) -> str:
         """The film as one page of HTML that needs no other file."""
-        drawing = _Drawing(self._result, self._scenes)
-        drawing.show(self._scenes.scenes[-1])  # which is without contact, often
-        frames = [drawing.moved(scene) for scene in self._scenes.scenes]
+        drawing = _Drawing(self)
+        drawing.show(self.scenes[-1])  # which is without contact, often
+        frames = [drawing.moved(scene) for scene in self.scenes]
         data = json.dumps(
             {"x": drawing.across, "top": drawing.top, "rate": _RATE, "frames": frames},
             separators=(",", ":"),
         )
-        result, gamma = self._result, self._result.problem.work_of_adhesion
+        result, gamma = self.result, self.result.problem.work_of_adhesion
         name, work = "loop: loss", result.lost
         if isinstance(result, PathResult):
             name, work = "path: work", result.work
-        jumps = counted(len(self._result.jumps), "jump")
-        shown = self._scenes.jumps_shown
-        if shown < len(self._result.jumps):
+        jumps = counted(len(result.jumps), "jump")
+        if (shown := self.jumps_shown) < len(result.jumps):
             jumps += f", of which the {shown} with the largest drops have frames of their own"
         parts = {
             "@SVG@": drawing.svg(),
@@ -284,13 +272,13 @@ class Film:
         return re.sub("@[A-Z]+@", lambda found: parts[found[0]], template)
 
     def _animation(self, ending: str, progress: Callable[[int, int], None] | None) -> bytes:
-        drawing = _Drawing(self._result, self._scenes)
+        drawing = _Drawing(self)
         writer = PillowWriter(fps=_RATE) if ending == ".gif" else FFMpegWriter(fps=_RATE)
         with tempfile.TemporaryDirectory() as folder, style(), mpl.rc_context(_LOOK):
             file = Path(folder, f"film{ending}")
             drawing.freeze()
             with writer.saving(drawing.figure, str(file), dpi=_DPI):
-                for number, scene in enumerate(self._scenes.scenes, 1):
+                for number, scene in enumerate(self.scenes, 1):
                     drawing.show(scene, texts=True)
                     writer.grab_frame()
                     if progress is not None:
@@ -301,8 +289,8 @@ class Film:
 class _Drawing:
     """The figure of a film, and what moves in it."""
 
-    def __init__(self, result: Result, scenes: Scenes) -> None:
-        self._result, self._scenes = result, scenes
+    def __init__(self, film: Film) -> None:
+        self._film = film
         with style(), mpl.rc_context(_LOOK):
             self.figure = new_figure(2, 1, _WIDTH, _HEIGHT, height_ratios=[3, 4])
             shape, curve = self.figure.axes
@@ -315,11 +303,11 @@ class _Drawing:
         self.top = int(self._tenths(shape, self._mm[:1], np.array([self._ceiling]))[1][0])
 
     def _draw_shape(self, axes: Axes) -> None:
-        x, height = self._scenes.x, 1e6 * self._scenes.height
+        x, height = self._film.x, 1e6 * self._film.height
         self._mm = 1e3 * x
         span = float(np.ptp(height))
         floor = height.min() - 0.05 * span
-        top = 1e6 * max(float(scene.surface.max()) for scene in self._scenes.scenes)
+        top = 1e6 * max(float(scene.surface.max()) for scene in self._film.scenes)
         self._ceiling = min(top, floor + _MOST_RANGE * span) + 0.1 * span
         axes.fill_between(self._mm, height, floor, color="0.55", lw=0)
         blue: Any = {"fc": "#56B4E9", "ec": "#0072B2", "lw": 1.0, "alpha": 0.55}
@@ -332,7 +320,7 @@ class _Drawing:
         axes.set_title(title, loc="left")
 
     def _draw_curve(self, axes: Axes) -> None:
-        result = self._result
+        result = self._film.result
         x, y = result.penetration, result.mean_stress / result.problem.stress_scale
         self._path = np.column_stack([x, y])
         for branch in ("loading", "unloading"):
@@ -394,7 +382,7 @@ class _Drawing:
         """
         _, y = self._tenths(self._shape, self._mm, 1e6 * scene.surface)
         point = self._tenths(self._curve, *self._path[[scene.state]].T)
-        spacing = self._scenes.x[1]
+        spacing = self._film.x[1]
         return {
             "y": [int(v) for v in np.diff(y, prepend=0)],
             "c": np.rint(1e3 * scene.patches / spacing).astype(int).ravel().tolist(),

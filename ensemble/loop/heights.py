@@ -14,7 +14,7 @@ from adhesis.ensemble.trace.reading.header_units import HeaderUnits, other_steps
 from adhesis.ensemble.trace.reading.measured_trace import load_array, units_of_columns
 from adhesis.ensemble.trace.reading.missing_heights import without_codes
 from adhesis.ensemble.trace.reading.source import source_of
-from adhesis.ensemble.trace.reading.text_table import read_column, refuse_uneven_rows
+from adhesis.ensemble.trace.reading.text_table import read_table, refuse_uneven_rows
 from adhesis.solver.checks import counted
 from adhesis.solver.model.profile import Array
 
@@ -55,7 +55,7 @@ def read_heights(
             or f"{path} is neither text nor .npy: --trace reads files of instruments, and a text "
             "that holds zero bytes (UTF-16 without a mark) is to be saved as UTF-8"
         )
-    table = None if source.is_npy else read_column(source, delimiter, decimal)
+    table = None if source.is_npy else read_table(source, delimiter, decimal, may_be_row=True)
     columns = table.columns[list(table.filled)] if table else np.atleast_2d(load_array(source)).T
     if 1 not in columns.shape:
         raise InputError(

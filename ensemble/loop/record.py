@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from adhesis.ensemble.errors import InputError
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.loop_state import LoopState
 from adhesis.solver.loading.path import PathResult
-from adhesis.solver.method import BRANCHES, Branch, ContactState, Method
+from adhesis.solver.method import BRANCHES, Branch, Method
 
 Result = LoopResult | PathResult
 
@@ -62,59 +63,29 @@ def document(results: Sequence[Result], warnings: Sequence[str] = ()) -> dict[st
     return documents[-1] | ({"turns": documents} if len(documents) > 1 else {})
 
 
-def fields_at_penetrations(
-    loop: LoopResult, method: Method, penetrations: Sequence[float], n: int
+def fields_of(
+    loop: LoopResult, method: Method, wanted: Sequence[float], at_stresses: bool, n: int
 ) -> dict[str, Any]:
-    """Return the fields on n nodes at penetrations Δ/h_max of both branches, as arrays.
+    """Return the fields on n nodes of states of both branches, as arrays.
+
+    The states are those at mean stresses in Pa, or at penetrations Δ/h_max. A branch that does not
+    have a mean stress is left out; InputError if neither branch has it.
 
     ``branch`` and ``penetration`` have shape (k,), ``x`` and ``height`` (n,), ``stress``,
     ``displacement`` and ``gap`` (k, n), ``edges`` (k, most patches, 2) with NaN for none.
     """
-    found = []
-    for branch in BRANCHES:
-        states = [loop.contact_states[k] for k in loop.states(branch)]
-        for wanted in penetrations:
-            state = _state_at(method, branch, states, wanted)
-            found.append(LoopState(branch, False, wanted, state, method))
-    return _arrays(found, n)
-
-
-def _state_at(
-    method: Method, branch: Branch, states: Sequence[ContactState], wanted: float
-) -> ContactState:
-    """Return the state of a branch at a penetration: one of its own, or one followed from there."""
-    separation = method.problem.separation(wanted)
-    before = None
-    for k, state in enumerate(states):
-        if state.patches and state.separation == separation:
-            return state
-        here = method.problem.penetration(state.separation)
-        if before is None and (here >= wanted if branch == "loading" else here <= wanted):
-            before = states[max(k - 1, 0)]
-    if before is None or (branch == "unloading" and not before.patches):
-        return method.detached(separation)
-    return method.follow(before, separation).states[-1]
-
-
-def fields_at_stresses(loop: LoopResult, stresses: Sequence[float], n: int) -> dict[str, Any]:
-    """Return the fields on n nodes at mean stresses in Pa, as :func:`fields_at_penetrations`.
-
-    A branch that does not have a mean stress is left out; InputError if neither branch has it.
-    """
-    found = []
-    absent = dict.fromkeys(stresses, 0)
-    for branch in BRANCHES:
-        for wanted in stresses:
-            try:
-                found.append(loop.at_stress(wanted, branch))
-            except ValueError as error:
-                absent[wanted] += 1
-                if absent[wanted] == len(BRANCHES):
-                    raise InputError(f"--field-stresses: {error}") from None
-    return _arrays(found, n)
-
-
-def _arrays(found: Sequence[LoopState], n: int) -> dict[str, Any]:
+    found: list[LoopState] = []
+    absent = dict.fromkeys(wanted, 0)
+    for branch, value in product(BRANCHES, wanted):
+        if not at_stresses:
+            found.append(_state_at(loop, method, branch, value))
+            continue
+        try:
+            found.append(loop.at_stress(value, branch))
+        except ValueError as error:
+            absent[value] += 1
+            if absent[value] == len(BRANCHES):
+                raise InputError(f"--field-stresses: {error}") from None
     edges = np.full((len(found), max(one.state.patches for one in found), 2), np.nan)
     for row, one in zip(edges, found, strict=True):
         row[: one.state.patches] = one.edges
@@ -127,3 +98,20 @@ def _arrays(found: Sequence[LoopState], n: int) -> dict[str, Any]:
         **{name: np.array([getattr(one, name) for one in fields]) for name in of_fields},
         "edges": edges,
     }
+
+
+def _state_at(loop: LoopResult, method: Method, branch: Branch, wanted: float) -> LoopState:
+    """Return a branch's state at a penetration: one of its own, or one followed from there."""
+    separation, before = method.problem.separation(wanted), None
+    states = [loop.contact_states[k] for k in loop.states(branch)]
+    for k, state in enumerate(states):
+        if state.patches and state.separation == separation:
+            return LoopState(branch, False, wanted, state, method)
+        here = method.problem.penetration(state.separation)
+        if before is None and (here >= wanted if branch == "loading" else here <= wanted):
+            before = states[max(k - 1, 0)]
+    if before is None or (branch == "unloading" and not before.patches):
+        state = method.detached(separation)
+    else:
+        state = method.follow(before, separation).states[-1]
+    return LoopState(branch, False, wanted, state, method)

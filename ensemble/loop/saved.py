@@ -24,10 +24,9 @@ import xarray as xr
 
 from adhesis._version import __version__
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.files import check_ending, check_outputs, open_regular, whole_file
 from adhesis.ensemble.loop.record import Result
-from adhesis.ensemble.outputs import check_ending, check_outputs, whole_file
 from adhesis.ensemble.quantities import units_under, with_units
-from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver import checks
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import MinorLoop, PathResult
@@ -246,11 +245,7 @@ def _result(found: xr.Dataset) -> Result:
 
 def sealed(content: bytes) -> bytes:
     """Return the bytes of a file with their checksum behind them."""
-    return content + _seal(content)
-
-
-def _seal(content: bytes) -> bytes:
-    return _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
+    return content + _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
 
 
 def _read_sealed(path: Path) -> xr.Dataset:
@@ -269,9 +264,9 @@ def _read_sealed(path: Path) -> xr.Dataset:
         if size > _MOST_BYTES:
             raise InputError(f"path is {path}: it has {size / 1e6:.0f} MB, more than any loop")
         stream.seek(0)
-        content = stream.read(size)
-    content, seal = content[:-_LENGTH], content[-_LENGTH:]
-    if seal != _seal(content):
+        whole = stream.read(size)
+    content = whole[:-_LENGTH]
+    if whole != sealed(content):
         raise InputError(
             f"path is {path}: it is damaged, as its bytes do not have their checksum; take a copy "
             "of it, or compute the loop again"

@@ -35,12 +35,12 @@ def film(
     progress: Callable[[int, int], None] | bool | None,
 ) -> Any:
     """Make a film, and write it where a path is given; see :meth:`adhesis.LoopResult.film`."""
-    from adhesis.ensemble.loop.film import Film, check_film, scenes_of
+    from adhesis.ensemble.loop.film import Film, check_film
 
     if path is not None:
         path = check_film("path", path)
     with bar("frames") if progress is True else nullcontext(progress or None) as shown:
-        made = Film(result, scenes_of(result, frames, shown))
+        made = Film(result, frames, shown)
         if path is not None:
             made.save(path, progress=shown if progress is True else None)
     return made

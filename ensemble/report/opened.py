@@ -9,21 +9,21 @@ from __future__ import annotations
 import inspect
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
-from adhesis.ensemble.aggregate.average import Aggregate, aggregate
+from adhesis.ensemble.aggregate.average import QUANTILES, Aggregate, aggregate
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.quantities import with_units
-from adhesis.ensemble.report.curves_dataset import curves_dataset
 from adhesis.ensemble.report.html import picture_of, table_of
 from adhesis.ensemble.report.tables import campaign_tables
 from adhesis.ensemble.report.tables.table import Table
@@ -46,6 +46,17 @@ _RENAMED = {
     "field_position": "position",
 }
 _NO_RESULTS = ("error", schema.CHECKSUM.name, schema.ORIGIN.name)
+# curve -> (unit, what it is)
+_CURVES = {
+    "mean_stress": ("Pa", "mean stress, compression positive"),
+    "mean_stress_dimensionless": ("1", "dimensionless mean stress 2 p/(E* q0 h_max)"),
+    "mean_stress_over_slope": ("1", "dimensionless mean stress over the root mean square slope"),
+    "contact_fraction": ("1", "contact fraction A/A0"),
+    "patches": ("1", "number of contact patches in one period"),
+    "energy": ("J m-1", "elastic and adhesion energy of one period per unit depth"),
+}
+# part of a curve -> (what it is, a dimension of its own)
+_PARTS = {"mean": ("mean",), "std": ("standard deviation",), "quantiles": ("quantiles", "quantile")}
 
 
 class Plots:
@@ -97,7 +108,7 @@ class Plots:
         ValueError
             If the campaign has no such axis beside H and γ.
         """
-        from adhesis.ensemble.report.figures.along import along
+        from adhesis.ensemble.report.figures.loss_figures import along
         from adhesis.ensemble.report.further_axes import with_figure
 
         axes = {axis.name: axis for axis in with_figure(self._results.averages)}
@@ -107,7 +118,7 @@ class Plots:
         return self._draw(partial(along, axes[name]), ax)
 
 
-class CampaignResults:
+class CampaignResults(AbstractContextManager["CampaignResults"]):
     """Results of a campaign, finished or not; made by :func:`adhesis.open`.
 
     Parameters
@@ -152,9 +163,6 @@ class CampaignResults:
         if schema.DAMAGED in status:
             self._counts["damaged"] = int(np.sum(status == schema.DAMAGED))
         self.plot = Plots(self)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         """Forget what was read; the file itself is closed after each access anyway."""
@@ -306,3 +314,43 @@ def _frame(table: Table, index: Sequence[str]) -> pd.DataFrame:
     frame = frame.set_index(list(index)) if index else frame
     frame.attrs["units"] = units
     return frame
+
+
+def curves_dataset(data: Aggregate) -> xr.Dataset:
+    """Collect every averaged curve: (hurst, work_of_adhesion, …, [quantile,] penetration).
+
+    Further axes of the campaign follow γ; NaN where a cell is not there, as keys vary together.
+    """
+    campaign = data.campaign
+    depth = f"penetration/{'max_penetration' if campaign.has_axis('max_penetration') else 'h_max'}"
+    names = [axis.name for axis in campaign.axes]
+    out = xr.Dataset(
+        coords={name: ("cell", [cell.at[name] for cell in data.cells]) for name in names},
+        attrs={
+            "title": "Loading-unloading curves averaged over realisations",
+            "source": printable(data.path.name),
+            "Conventions": "CF-1.11",
+        },
+    )
+    text = "quantile over realisations"
+    out["quantile"] = ("quantile", list(QUANTILES), _about("1", text))
+    done = np.array([cell.done for cell in data.cells], np.int32)
+    out["realisations"] = ("cell", done, _about("1", "realisations that were averaged"))
+    for branch in BRANCHES:
+        along = f"{branch}_penetration"
+        out[along] = (along, getattr(campaign, along), _about("1", f"{depth} on {branch}"))
+        for name, (unit, text) in _CURVES.items():
+            base = f"{branch}_{name}"
+            for part, (what, *further) in _PARTS.items():
+                values = np.array([getattr(cell.curves[base], part) for cell in data.cells])
+                about = _about(unit, f"{text}, {what} on {branch}")
+                out[f"{base}_{part}"] = (("cell", *further, along), values, about)
+    out = out.set_index(cell=names).unstack("cell", fill_value={"realisations": 0})
+    meanings = ("Hurst exponent", "work of adhesion", *(axis.meaning for axis in data.further))
+    for axis, meaning in zip(campaign.axes, meanings, strict=True):
+        out[axis.name].attrs = _about(axis.unit, meaning)
+    return out.transpose(*names, ...)
+
+
+def _about(unit: str, text: str) -> dict[str, str]:
+    return {"units": unit, "long_name": text}

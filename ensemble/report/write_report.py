@@ -7,7 +7,7 @@ from pathlib import Path
 
 from adhesis.ensemble.aggregate.average import Aggregate, aggregate
 from adhesis.ensemble.escape import printable
-from adhesis.ensemble.outputs import Writing, staged_folder, write_netcdf
+from adhesis.ensemble.files import Writing, staged_folder
 
 
 def write_report(
@@ -49,11 +49,11 @@ def _older_files(directory: Path) -> list[str]:
 def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], None]) -> None:
     progress("tables")
     # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
-    from adhesis.ensemble.report.curves_dataset import curves_dataset
     from adhesis.ensemble.report.figures.catalogue import sections
     from adhesis.ensemble.report.figures.style import save, style
     from adhesis.ensemble.report.html import html_page
     from adhesis.ensemble.report.markdown_page import write_page
+    from adhesis.ensemble.report.opened import curves_dataset
     from adhesis.ensemble.report.tables import campaign_tables
 
     tables = {
@@ -69,7 +69,11 @@ def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], Non
         tables["beside"] = campaign_tables.companions(data)
     for name, table in tables.items():
         table.write_csv(directory / f"{name}.csv")
-    write_netcdf(directory / "curves.nc", curves_dataset(data))
+    # In memory: HDF5 reports a full disk when the file is closed, and ends the process with a
+    # segmentation fault where the library closes it at exit. The view is released at once, as one
+    # that an error keeps alive is reported at the exit.
+    with memoryview(curves_dataset(data).to_netcdf(None, engine="h5netcdf")) as curves:
+        (directory / "curves.nc").write_bytes(curves)
     figures = sections(data)
     items = [item for illustrations in figures.values() for item in illustrations]
     for number, item in enumerate(items, 1):

@@ -29,15 +29,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.regular_file import open_regular
+from adhesis.ensemble.files import open_regular
 from adhesis.ensemble.results.schema import CHECKSUM, ROW_DATASETS, STATUS
 from adhesis.ensemble.task.dataset import KEPT, Dataset
 
 _BLOCK_BYTES = 16 * 2**20
-
-Read = Callable[[str, slice], NDArray[Any]]
-"""Returns some rows of a dataset, by its name."""
-
 
 _ORDERED = sorted((d for d in ROW_DATASETS if d is not CHECKSUM), key=lambda d: d.name)
 # The datasets that the checksum of a row covers, in its order: what a run writes, not what the task
@@ -60,10 +56,13 @@ def _bytes(rows: NDArray[Any]) -> NDArray[np.uint8]:
     return np.ascontiguousarray(little).reshape(len(rows), -1).view(np.uint8)
 
 
-def row_checksums(read: Read, kept: NDArray[np.intp], rows: NDArray[np.intp]) -> NDArray[np.uint32]:
+def row_checksums(
+    read: Callable[[str, slice], NDArray[Any]], kept: NDArray[np.intp], rows: NDArray[np.intp]
+) -> NDArray[np.uint32]:
     """Compute the checksums of some rows from what they hold; a block is in memory at a time.
 
-    ``kept`` are the rows that keep their fields; both they and ``rows`` ascend.
+    ``read`` returns some rows of a dataset, by its name; ``kept`` are the rows that keep their
+    fields; both they and ``rows`` ascend.
     """
     out = np.zeros(rows.size, np.uint32)
     places = dict(zip(kept.tolist(), range(kept.size), strict=True))

@@ -238,7 +238,7 @@ class Results(AbstractContextManager["Results"]):
     @cached_property
     def _checked_status(self) -> NDArray[np.uint8]:
         suspects, status = np.arange(len(self)), np.zeros(len(self), np.uint8)
-        # A row that a run empties and computes again at this moment looks damaged, once.
+        # A row that a run computes again at this moment looks damaged, once.
         for _ in range(_LOOKS):
             status[suspects] = self.column(schema.STATUS.name, suspects)
             suspects = suspects[status[suspects] != schema.PENDING]

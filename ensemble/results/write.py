@@ -10,7 +10,6 @@ succeeds in its eyes; the error of the first that did not is raised by :meth:`Di
 from __future__ import annotations
 
 import io
-import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
@@ -34,7 +33,6 @@ _KEPT_NAMES = frozenset(d.name for d in OF_KEPT)
 
 # Bytes: Open MPI 4.1 ends every rank where a path with its own additions has more than 255.
 _LONGEST_NAME = 200
-_BLOCK_BYTES = 16 * 2**20  # of rows that are emptied at once
 _DESCRIPTORS = Path("/proc/self/fd")  # of Linux
 
 
@@ -54,31 +52,32 @@ class DiskFile(io.FileIO):
         if self._error is not None:
             raise self._error
 
+    @contextmanager
+    def _kept(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            self._error = self._error or error
+
     def close(self) -> None:
         """Close the file, after h5py has closed its own."""
-        try:
+        with self._kept():  # some disks report only now that they are full
             super().close()
-        except OSError as error:  # some disks report only now that they are full
-            self._error = self._error or error
 
     def write(self, data: Any, /) -> int:
         """Write here."""
         rest = memoryview(data).cast("B")
         length = rest.nbytes
-        try:
+        with self._kept():
             while rest.nbytes:
                 rest = rest[super().write(rest) :]
-        except OSError as error:
-            self._error = self._error or error
         return length
 
     def truncate(self, size: int | None = None, /) -> int:
         """Set the length of the file."""
-        try:
+        with self._kept():
             return super().truncate(size)
-        except OSError as error:
-            self._error = self._error or error
-            return size or 0
+        return size or 0
 
 
 @contextmanager
@@ -125,8 +124,7 @@ class Writer(AbstractContextManager["Writer"]):
             except OSError as error:  # it was there when the run was prepared
                 raise WriteError(f"{self.path} could not be opened: {reason(error)}") from error
             self._datasets = {d.name: DatasetRows(self._file[d.name]) for d in schema.ROW_DATASETS}
-            self._kept_rows = self._file[KEPT][:]
-            self._kept = {row: place for place, row in enumerate(self._kept_rows.tolist())}
+            self._kept = {row: place for place, row in enumerate(self._file[KEPT][:].tolist())}
         self._origin = origin
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -164,29 +162,11 @@ class Writer(AbstractContextManager["Writer"]):
         values = {"error": schema.encode_text(error), "wall_time": wall_time, "rank": rank}
         return self._write(row, values | self._origin_of(rank), schema.FAILED)
 
-    def reset(self, rows: Iterable[int]) -> None:
-        """Empty rows (ascending), which are to be computed; what they held is lost."""
-        width = sum(rows_of.nbytes for rows_of in self._datasets.values())
-        most = max(1, _BLOCK_BYTES // width)
-        for stretch in stretches(np.fromiter(rows, np.intp)):
-            for first in range(stretch.start, stretch.stop, most):
-                last = min(first + most, stretch.stop)
-                with self._writing(first):
-                    # First the status: a row that is being emptied is not to be taken for whole.
-                    self._put(schema.STATUS, first, [schema.PENDING] * (last - first))
-                    kept = np.searchsorted(self._kept_rows, (first, last)).tolist()
-                    for dataset in (*OF_TASKS, *OF_KEPT):
-                        if dataset is not schema.STATUS:
-                            start, stop = kept if dataset.dims[0] == KEPT else (first, last)
-                            rows_of = self._datasets[dataset.name]
-                            shape = (stop - start, *rows_of.shape)
-                            rows_of.write(start, np.full(shape, dataset.fill, rows_of.dtype))
-                    self._put(schema.CHECKSUM, first, [schema.CHECKSUM.fill] * (last - first))
-
     def mark(self, rows: Iterable[int], status: int) -> None:
-        """Mark rows (ascending) without a result as pending, or as not needed.
+        """Mark rows (ascending) as pending, or those without a result as not needed.
 
-        What else they hold is not touched: nothing, or what a run that was killed has left.
+        What else they hold is not touched: nothing, a result that is computed again, or what a run
+        that was killed has left.
         """
         for stretch in stretches(np.fromiter(rows, np.intp)):
             here = np.arange(stretch.start, stretch.stop)
@@ -284,11 +264,6 @@ class DatasetRows:
         self.dtype = dataset.dtype
         self._space = self._id.get_space()
         self._rest = (0,) * len(self.shape)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of a row."""
-        return int(math.prod(self.shape) * self.dtype.itemsize)
 
     def block(self, value: Any) -> NDArray[Any]:
         """Return the bytes that a value of a row has in the file, shape (1, …)."""

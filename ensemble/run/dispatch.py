@@ -116,8 +116,8 @@ class Limits:
 
     # Returns why the run is to stop now, or None. Asked on every rank.
     stop: Callable[[], str | None] = lambda: None
-    # Returns the seconds until the deadline, or None: tasks that would not fit stay behind
-    time_left: Callable[[], float | None] = lambda: None
+    # Returns the seconds until the deadline: tasks that would not fit stay behind
+    time_left: Callable[[], float] = lambda: math.inf
     task_seconds: float | None = None  # longest time of one task
     grace: float = 30.0  # how long workers may take to answer a stop or their dismissal, in s
     silence: float = SILENCE  # how long a worker may not be heard from until the run ends, in s

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import signal
 import threading
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from traceback import walk_tb
 from types import FrameType
 from typing import Any, Self
@@ -21,6 +21,7 @@ RESERVE, RESERVE_SHARE = 30.0, 0.1
 # Time for workers to answer a stop (s); with a walltime at most this share of the reserve. The rest
 # is for closing the file and ending the ranks.
 GRACE, GRACE_SHARE = 30.0, 0.5
+NEVER = (math.inf, GRACE)
 
 _CLOCK = re.compile(r"(?:(\d+)-)?(?:(\d+):)?(\d+):(\d+)")
 _UNITS = re.compile(r"(?:(\d+)d)?(?:(\d+)h)?(?:(\d+)m)?(?:(\d+(?:\.\d*)?)s?)?")
@@ -86,30 +87,23 @@ def parse_duration(text: str) -> float:
     return seconds
 
 
-@dataclass(frozen=True)
-class Deadline:
-    """Time at which a run has to stop."""
-
-    at: float  # time at which tasks in progress are given up, in s of ``time.time()``
-    grace: float  # time that workers may take from then on, in s
-
-
 def deadline(
     walltime: float | None, started: float, environ: Mapping[str, str] = os.environ
-) -> Deadline | None:
-    """Return when to give up the tasks in progress; None if never.
+) -> tuple[float, float]:
+    """Return when to give up the tasks in progress, and how long workers may take then, in s.
 
-    ``walltime`` is in s from ``started`` (``time.time()``). Without it that of the batch system
-    counts: Slurm sets the end of the job, Torque its length.
+    The first is a time as ``time.time()`` counts, infinite for never. ``walltime`` is in s from
+    ``started``. Without it that of the batch system counts: Slurm sets the end of the job, Torque
+    its length.
     """
     if walltime is not None:
         return _before(started + walltime, started)
     for name, begin in (("SLURM_JOB_END_TIME", 0.0), ("PBS_WALLTIME", started)):
         with suppress(KeyError, ValueError):
             return _before(begin + float(environ[name]), started)
-    return None
+    return NEVER
 
 
-def _before(end: float, started: float) -> Deadline:
+def _before(end: float, started: float) -> tuple[float, float]:
     reserve = min(RESERVE, RESERVE_SHARE * max(0.0, end - started))
-    return Deadline(end - reserve, min(GRACE, GRACE_SHARE * reserve))
+    return end - reserve, min(GRACE, GRACE_SHARE * reserve)

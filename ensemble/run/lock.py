@@ -20,14 +20,14 @@ import socket
 import stat
 import time
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from adhesis.ensemble.errors import InputError, WriteError, refusal
 from adhesis.ensemble.escape import one_line
-from adhesis.ensemble.outputs import target_of
+from adhesis.ensemble.files import target_of
 from adhesis.ensemble.reporter import log
 from adhesis.solver.checks import counted
 
@@ -38,7 +38,7 @@ _MAX_RECORD = 4096  # bytes
 _RETRY_INTERVAL = 0.1  # s
 
 
-class RunLock:
+class RunLock(AbstractContextManager["RunLock"]):
     """Lock that a run holds while it writes to a results file, which need not exist."""
 
     def __init__(self, results: Path | str) -> None:
@@ -73,9 +73,6 @@ class RunLock:
         """Hold a share of the lock, by any other rank that writes, after rank 0 has acquired it."""
         with suppress(OSError):  # rank 0 has warned
             fcntl.flock(self._open(), fcntl.LOCK_SH)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         # After a failure other ranks may still write: a new run finds their locks on this file.

@@ -22,7 +22,7 @@ from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.layout import Source, check_space, create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.write import Writer
-from adhesis.ensemble.run.interrupt import Deadline
+from adhesis.ensemble.run.interrupt import NEVER
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.versions import versions
 from adhesis.solver.checks import counted
@@ -75,8 +75,8 @@ class Options:
 
     part: Part = WHOLE  # the share of the tasks to compute
     redo: Selection | None = None  # rows to compute again
-    max_failures: int | None = 20  # so many failed tasks stop the run
-    deadline: Deadline | None = None  # when to give up what is in flight
+    max_failures: float = 20  # so many failed tasks stop the run; infinite: none do
+    deadline: tuple[float, float] = NEVER  # of :func:`adhesis.ensemble.run.interrupt.deadline`
     patience: float = 10.0  # how long to wait for another run to let go of the results file, in s
     # Processes that compute beside this one where there are no ranks; 0 computes here
     processes: int = 0
@@ -178,7 +178,7 @@ def prepare(
         check_cell(task)
     if again or plan.batches is not None:
         with Writer(path) as writer:
-            writer.reset(again)
+            writer.mark(again, schema.PENDING)
             if plan.batches is not None:
                 spare = np.zeros(status.size, bool)
                 spare[plan.batches.not_needed] = True

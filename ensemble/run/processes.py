@@ -41,11 +41,6 @@ class Processes:
         self._up: set[int] = set()  # ranks that have sent something
         self._dismissed: set[int] = set()
 
-    @property
-    def pids(self) -> list[int]:
-        """Ids of the processes, by rank."""
-        return [self._processes[rank].pid for rank in self.workers]
-
     def __enter__(self) -> Self:
         try:
             for rank in self.workers:

@@ -10,6 +10,7 @@ it. Tasks of one group and round share work, and go out together, as one unit.
 
 from __future__ import annotations
 
+import math
 from bisect import insort
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -98,7 +99,7 @@ class Schedule:
             left[self.group_of[task]] += 0.5
         return sum(count * self.estimate(name) for name, count in left.items()) / workers
 
-    def take(self, time_left: float | None = None) -> Unit:
+    def take(self, time_left: float = math.inf) -> Unit:
         """Return the next unit; an empty one if none waits or fits into ``time_left`` (s)."""
         for turn in self._turns:
             units = self._rounds[turn]
@@ -126,5 +127,5 @@ class Schedule:
     def _length(self, unit: Unit) -> float:
         return len(unit) * self.estimate(self.group_of[unit[0]])
 
-    def _fits(self, unit: Unit, time_left: float | None) -> bool:
-        return time_left is None or not self._known_prior or self._length(unit) <= time_left
+    def _fits(self, unit: Unit, time_left: float) -> bool:
+        return not self._known_prior or self._length(unit) <= time_left

@@ -19,14 +19,14 @@ from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task, Tasks
 from adhesis.ensemble.errors import WriteError, parameter
-from adhesis.ensemble.outputs import target_of
+from adhesis.ensemble.files import target_of
 from adhesis.ensemble.quantities import duration
 from adhesis.ensemble.reporter import Display
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import CHECKSUM, DONE, FAILED, NOT_NEEDED, origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import dispatch
-from adhesis.ensemble.run.interrupt import GRACE, StopSignals
+from adhesis.ensemble.run.interrupt import StopSignals
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.plan import Group, Options, Plan, group_of, prepare, prior
 from adhesis.ensemble.run.processes import Processes
@@ -201,9 +201,8 @@ class _Session:
     def __post_init__(self) -> None:
         campaign, plan, options, engine = self.campaign, self.plan, self.options, self.engine
         self._started = time.monotonic()
-        # by the clock that nobody sets
-        deadline = options.deadline
-        self._ends = None if deadline is None else deadline.at - time.time() + self._started
+        at, grace = options.deadline
+        self._ends = at - time.time() + self._started  # by the clock that nobody sets
         total = plan.done + plan.failed + len(plan.rows)
         self._counts = Summary(total, plan.done, plan.failed)
         self._compute = partial(_compute, engine.compute, campaign, plan.tasks)
@@ -211,7 +210,7 @@ class _Session:
             stop=self._stop,
             time_left=self._time_left,
             task_seconds=campaign.solver.time_limit,
-            grace=GRACE if deadline is None else deadline.grace,
+            grace=grace,
             silence=engine.silence,
             report_interval=min(dispatch.REPORT_INTERVAL, engine.silence / 12),
         )
@@ -328,14 +327,13 @@ class _Session:
         if self.signals.received is not None:
             name = self.signals.received
             return f"{'Ctrl-C (SIGINT)' if name == 'SIGINT' else name} received"
-        left = self._time_left()
-        if left is not None and left <= 0:
+        if self._time_left() <= 0:
             return "the walltime ends"
         most = self.options.max_failures
-        if most is not None and self._counts.failed_now >= most:
+        if self._counts.failed_now >= most:
             limit = f"{parameter('max_failures', 'adhesis run')} {most}"
             return f"{counted(self._counts.failed_now, 'task')} failed (the limit is {limit})"
         return None
 
-    def _time_left(self) -> float | None:
-        return None if self._ends is None else self._ends - time.monotonic()
+    def _time_left(self) -> float:
+        return self._ends - time.monotonic()

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import parameter
-from adhesis.ensemble.outputs import check_output_folder, staged_folder, write_json
+from adhesis.ensemble.files import check_output_folder, staged_folder, write_json
 from adhesis.ensemble.quantities import length_text, with_error, with_units
 from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.run.dispatch import Unresponsive

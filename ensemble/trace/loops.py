@@ -167,7 +167,7 @@ class Loops:
     """Loops of a plan in processes, the longest first; 0 processes run them in this one.
 
     ``seconds`` are expected, by name. ``done`` holds the result by name, the error text of a failed
-    loop; ``pids`` the ids of the processes.
+    loop.
     """
 
     def __init__(
@@ -177,24 +177,21 @@ class Loops:
         self.count = len(self._runs)
         self.processes = min(processes, self.count)
         self.done: dict[str, Result | str] = {}
-        self.pids: list[int] = []
         expected = [(seconds or {}).get(run.name, 1.0) for run in self._runs]
         priors: dict[Hashable, float] = dict(enumerate(expected))
         tasks = range(self.count)
         self._schedule = Schedule(tasks, dict(enumerate(tasks)), priors, dict.fromkeys(tasks, 0))
-        self._master: Master | None = None
+        self._notes: Mapping[int, Any] = {}  # of the loops that run, as the master has them
 
     @property
     def seconds_left(self) -> float | None:
         """Estimated time to the end, in s; None if nothing is known yet."""
-        in_flight = [] if self._master is None else list(self._master.notes)
-        return self._schedule.seconds_left(in_flight, max(self.processes, 1))
+        return self._schedule.seconds_left(list(self._notes), max(self.processes, 1))
 
     @property
     def running(self) -> dict[str, tuple[str, float]]:
         """By name: the branch and prescribed value reached."""
-        notes = {} if self._master is None else self._master.notes
-        return {self._runs[k].name: note or ("loading", 0.0) for k, note in notes.items()}
+        return {self._runs[k].name: note or ("loading", 0.0) for k, note in self._notes.items()}
 
     def __str__(self) -> str:
         """Return how far they are, as a line."""
@@ -236,9 +233,8 @@ class Loops:
             if self.processes == 0:
                 channel = OwnWorker(computing, limits)
             else:
-                channel = started = Processes(self.processes, computing, limits)
-                stack.enter_context(started)
-                self.pids = started.pids
-            self._master = Master(channel, self._schedule, collect, limits, tick)
-            self._master.run()
+                channel = stack.enter_context(Processes(self.processes, computing, limits))
+            master = Master(channel, self._schedule, collect, limits, tick)
+            self._notes = master.notes
+            master.run()
         return self.done

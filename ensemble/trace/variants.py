@@ -56,8 +56,7 @@ class Plan(ByValue):
     def text(self) -> str:
         """Description of the plan in two or three lines."""
         lines = [
-            f"plan        {self.waves} waves, about {self.patches} "
-            f"patch{'es' if self.patches != 1 else ''} at a time: "
+            f"plan        {self.waves} waves, about {counted(self.patches, 'patch')} at a time: "
             f"{len(self.runs)} loops, about {duration(sum(self.seconds.values()))} of CPU time, "
             f"{duration(self.wall)} on {self.cores} of a quiet machine"
         ]

@@ -8,8 +8,8 @@ import pytest
 
 from adhesis.ensemble.aggregate.average import BIN_EDGES, QUANTILES, SMALL, aggregate, fitted_slope
 from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.campaign.precision import estimates, interval, interval_method, untransformed
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.interval import estimates, interval, interval_method, untransformed
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.fields import FieldPlan
@@ -155,7 +155,7 @@ def test_spectra_leave_out_realisations_without_contact(tmp_path):
     assert slope == pytest.approx(-2.8, abs=1e-3)
     with Results(tmp_path / "r.h5") as results:
         first = results.column("field_height", slice(0, 1))[0]
-    np.testing.assert_array_equal(cell.fields.shape.height, first)
+    np.testing.assert_array_equal(cell.fields.shape[0], first)
 
 
 def test_a_fitted_slope_knows_its_error():

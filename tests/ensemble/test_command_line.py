@@ -210,7 +210,7 @@ def test_a_signal_while_modules_are_loaded_leaves_no_part_of_an_output(tmp_path)
         "from pathlib import Path\n"
         "from adhesis.ensemble.command import status\n"
         "from adhesis.ensemble.command.main import main\n"
-        "from adhesis.ensemble.outputs import staged_folder, whole_file\n"
+        "from adhesis.ensemble.files import staged_folder, whole_file\n"
         "class Finder:\n"
         "    def find_spec(name, *_):\n"
         f"        os.kill(os.getpid(), {int(signal.SIGTERM)})\n"

@@ -21,7 +21,7 @@ from adhesis.ensemble.report.findings import missing
 from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.results import checksum
 from adhesis.ensemble.results.checksum import write_head
-from adhesis.ensemble.results.merge import merge
+from adhesis.ensemble.results.layout import merge
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, PENDING, ROW_DATASETS
 from adhesis.ensemble.run.session import Options, run_campaign
@@ -314,7 +314,7 @@ def test_a_merge_takes_a_damaged_row_from_another_file(damage, path, tmp_path):
     assert differences(path, damage.sound) == []
 
 
-def test_a_row_that_a_run_empties_while_it_is_read_is_not_called_damaged(path, monkeypatch):
+def test_a_row_that_a_run_computes_again_while_it_is_read_is_not_called_damaged(path, monkeypatch):
     with h5py.File(path) as file:
         status, loss = (file[name].id.get_offset() for name in ("status", "loss"))
     real, looks = reading.row_checksums, []

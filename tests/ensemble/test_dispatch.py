@@ -311,7 +311,7 @@ def test_processes_that_do_not_answer_are_not_waited_for(monkeypatch):
         subprocess.Popen, "wait", lambda p, timeout=None: calls.append("wait") or wait(p, timeout)
     )
     with Processes(1, never, Limits()) as channel:
-        os.kill(channel.pids[0], signal.SIGSTOP)
+        os.kill(channel._processes[1].pid, signal.SIGSTOP)
     assert calls[0] == "kill"
 
 

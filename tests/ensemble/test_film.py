@@ -12,7 +12,7 @@ from PIL import Image
 import adhesis.ensemble.loop.film as scenes_module
 from adhesis import Control, InputError, LoopResult, Problem, run_loop, single_wave
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.loop.film import Film, scenes_of
+from adhesis.ensemble.loop.film import Film
 from tests.support.browser import needs_browser, seen_by_browser
 from tests.support.exact_wave import ExactWave
 from tests.support.scenes import HALF_SPACE, loop_of, rough
@@ -36,7 +36,7 @@ def data_of(page: str) -> dict:
 
 def test_every_jump_has_a_frame_before_and_one_after_it_that_announces_its_drop(loop, film):
     assert len(loop.jumps) > 5
-    scenes = {scene.state: scene for scene in film._scenes.scenes}
+    scenes = {scene.state: scene for scene in film.scenes}
     assert list(scenes) == sorted(scenes)
     assert {0, len(loop.separation) - 1} <= set(scenes)
     assert len(scenes) >= 30
@@ -47,11 +47,11 @@ def test_every_jump_has_a_frame_before_and_one_after_it_that_announces_its_drop(
         assert announced == f"jump ({jump.kind}): energy drop {jump.energy_drop:.3g} J/m²"
     announced = [scene for scene in scenes.values() if scene.announcement]
     assert len(announced) == len(loop.jumps)
-    assert f"lost {loop.loss_from_drops:.3g} J/m²" in film._scenes.scenes[-1].caption
+    assert f"lost {loop.loss_from_drops:.3g} J/m²" in film.scenes[-1].caption
 
 
 def test_frames_are_even_along_the_path(loop):
-    states = [scene.state for scene in scenes_of(loop, 40).scenes]
+    states = [scene.state for scene in Film(loop, 40).scenes]
     way = np.concatenate([[0], np.cumsum(np.abs(np.diff(loop.penetration)))])
     widest = max(np.diff(way).max(), way[-1] / 39)
     assert np.diff(way[states]).max() <= 2 * widest
@@ -60,10 +60,10 @@ def test_frames_are_even_along_the_path(loop):
 def test_of_more_jumps_than_frames_those_with_the_largest_drops_are_shown(loop, monkeypatch):
     monkeypatch.setattr(scenes_module, "MOST_FRAMES", 12)
     film = loop.film(frames=4)
-    shown = film._scenes.jumps_shown
+    shown = film.jumps_shown
     assert len(film) <= 12
     assert 0 < shown < len(loop.jumps)
-    states = {scene.state for scene in film._scenes.scenes}
+    states = {scene.state for scene in film.scenes}
     places = dict(zip(loop.states_before_jumps(), loop.jumps, strict=True))
     drops = sorted((jump.energy_drop for jump in loop.jumps), reverse=True)
     for place, jump in places.items():
@@ -71,7 +71,7 @@ def test_of_more_jumps_than_frames_those_with_the_largest_drops_are_shown(loop, 
             assert {place, place + 1} <= states
     assert f"of which the {shown} with the largest drops have frames of their own" in film.page
     # those without a frame are counted where they happen
-    together = [scene.announcement for scene in film._scenes.scenes if scene.announcement]
+    together = [scene.announcement for scene in film.scenes if scene.announcement]
     assert any(" jumps (" in text for text in together)
 
 
@@ -81,7 +81,7 @@ def test_a_frame_shows_the_exact_surface_and_patches(control):
     method = ExactWave(problem, states_per_step=4)
     turn = {"max_stress": 500.0} if control.is_load else {"max_penetration": 0.5}
     loop = run_loop(method, load_steps=4, **turn)
-    scenes = scenes_of(loop, 20)
+    scenes = Film(loop, 20)
     for scene in scenes.scenes:
         state = loop.contact_states[scene.state]
         if not state.patches:
@@ -115,7 +115,7 @@ def test_animations_are_written_by_their_writers(loop, tmp_path, ending):
         pytest.skip("ffmpeg, which writes .mp4, is not installed")
     file = tmp_path / f"loop{ending}"
     film = loop.film(frames=2)
-    film._scenes.scenes[:] = film._scenes.scenes[4:8]  # equal frames are one in a .gif
+    film.scenes[:] = film.scenes[4:8]  # equal frames are one in a .gif
     drawn = []
     film.save(file, progress=lambda number, total: drawn.append((number, total)))
     assert drawn == [(1, 4), (2, 4), (3, 4), (4, 4)]
@@ -179,7 +179,7 @@ const wait = setInterval(() => {
 def test_the_page_plays_in_a_browser_and_its_slider_moves_the_state(film, tmp_path):
     seen = seen_by_browser(film.page, _PROBE, tmp_path)
     assert seen["errors"] == []
-    scenes = film._scenes.scenes
+    scenes = film.scenes
     assert seen["frames"] == len(scenes) == seen["last"] + 1
     for k, (shown, scene) in enumerate(zip(seen["moved"], scenes, strict=True)):
         assert shown["slider"] == k

@@ -10,8 +10,8 @@ import pytest
 
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tables import TABLES
-from adhesis.ensemble.campaign.template import EXAMPLES, campaign_template
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
+from adhesis.ensemble.command.new import KEY_EXAMPLES, campaign_template
 from adhesis.ensemble.report.figures.catalogue import ALL
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from tests.support.campaign_support import ROOT, run_python
@@ -33,7 +33,7 @@ def listed(text: str) -> list[tuple[str, str]]:
 
 def test_templates_and_captions_are_those_without_docstrings_too() -> None:
     code = (
-        "from adhesis.ensemble.campaign.template import campaign_template\n"
+        "from adhesis.ensemble.command.new import campaign_template\n"
         "from adhesis.ensemble.report.figures.catalogue import ALL\n"
         "print(campaign_template(), [(item.title, item.caption) for item in ALL])"
     )
@@ -74,7 +74,7 @@ def test_a_key_in_a_comment_shows_its_default_or_a_value_that_is_allowed(table, 
         text = text.replace("\nmax_penetration", "\n# max_penetration")
         text = text.replace('# control = "separation"', 'control = "load"')
     value = getattr(getattr(parse_campaign(text), table), key)
-    if f"{table}.{key}" in EXAMPLES:
+    if f"{table}.{key}" in KEY_EXAMPLES:
         assert entry.default is None
         assert value is not None
         assert "# example; left out by default" in line

@@ -15,8 +15,7 @@ from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.results import layout
 from adhesis.ensemble.results.checksum import write_head
-from adhesis.ensemble.results.layout import create
-from adhesis.ensemble.results.merge import merge
+from adhesis.ensemble.results.layout import create, merge
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, PENDING
 from adhesis.ensemble.results.write import Writer
@@ -192,7 +191,7 @@ def test_a_part_is_what_it_is(tmp_path, capsys):
 MERGED = """
 import sys
 from adhesis.ensemble.results import checksum, layout
-from adhesis.ensemble.results.merge import merge
+from adhesis.ensemble.results.layout import merge
 from adhesis.ensemble.run.launch import peak_bytes
 checksum._BLOCK_BYTES = layout._BLOCK_BYTES = 2**20
 half, whole, *parts = sys.argv[1:]

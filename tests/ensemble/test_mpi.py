@@ -12,10 +12,9 @@ import pytest
 
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.campaign.tasks import Part
-from adhesis.ensemble.results.layout import create
-from adhesis.ensemble.results.merge import merge
+from adhesis.ensemble.results.layout import create, merge
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import DONE
+from adhesis.ensemble.results.schema import DONE, PENDING
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import (
@@ -67,7 +66,7 @@ def test_loops_have_the_same_bits_on_ranks_resumed_and_in_parts(tmp_path):
     resumed = tmp_path / "resumed.h5"
     shutil.copy(whole, resumed)
     with Writer(resumed) as writer:
-        writer.reset([1, 2])
+        writer.mark([1, 2], PENDING)
     assert run_campaign(campaign, resumed).computed == 2
     assert differences(resumed, whole) == []
     parts = [tmp_path / "1.h5", tmp_path / "2.h5"]

@@ -11,7 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file, write_json, write_new
+from adhesis.ensemble.files import check_outputs, staged_folder, whole_file, write_json, write_new
 from adhesis.ensemble.report.figures import style
 from tests.support.campaign_support import adhesis_here
 from tests.support.options import OF_WAVE, WAVE_HEIGHTS

@@ -1,6 +1,7 @@
 """Realisations in batches until the mean is known well enough: the rule, and its runs."""
 
 import json
+import math
 import shutil
 
 import numpy as np
@@ -12,14 +13,15 @@ from adhesis.ensemble.campaign.precision import (
     LEAST,
     MOST_LISTED,
     enough,
+    estimates,
     fewest,
+    interval,
     looks,
     precision,
     precision_lines,
 )
 from adhesis.ensemble.campaign.tables import growth
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.interval import estimates, interval
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.checksum import row_checksums
@@ -312,7 +314,7 @@ def test_the_report_has_the_interval_of_the_table_and_the_verdict_of_the_rule(
 def test_failures_count_as_looked_at_and_may_be_computed_again(tmp_path):
     path, out = tmp_path / "c.toml", tmp_path / "r.h5"
     path.write_text(text())
-    summary = run_file(path, out, fake="fail=*:*:3", max_failures=None)
+    summary = run_file(path, out, fake="fail=*:*:3", max_failures=math.inf)
     assert summary.failed == 2
     with Results(out) as results:
         assert np.sum(results.status() == FAILED) == 2

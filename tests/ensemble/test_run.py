@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import math
 import os
 import re
 import signal
@@ -435,11 +436,11 @@ def test_the_deadline_of_the_batch_system():
         (None, {"SLURM_JOB_END_TIME": "10005"}, 10005.0),
         (None, {"PBS_WALLTIME": "100"}, 105.0),
     ):
-        found = deadline(walltime, 5.0, environ)
-        assert found.at == end - min(30.0, 0.1 * (end - 5.0))
+        at, grace = deadline(walltime, 5.0, environ)
+        assert at == end - min(30.0, 0.1 * (end - 5.0))
         # half of what is kept in reserve is left when workers that did not answer are ended
-        assert found.at + found.grace == pytest.approx(0.5 * (found.at + end))
-    assert deadline(None, 5.0, {}) is None
+        assert at + grace == pytest.approx(0.5 * (at + end))
+    assert deadline(None, 5.0, {}) == (math.inf, 30.0)
 
 
 def test_workers_have_as_long_to_answer_as_the_walltime_leaves_by_any_clock(tmp_path, monkeypatch):

@@ -21,7 +21,7 @@ from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import write_head
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import DATASETS, DONE, FAILED, scales
+from adhesis.ensemble.results.schema import DATASETS, DONE, FAILED, PENDING, scales
 from adhesis.ensemble.results.write import DatasetRows, DiskFile, Writer
 from adhesis.ensemble.run.lock import RunLock, holder
 from adhesis.ensemble.task.dataset import KEPT
@@ -213,9 +213,9 @@ def test_every_moment_of_writing_leaves_a_sound_file(tmp_path, monkeypatch):
     with Writer(path) as writer:
         writer.write_result(0, first)
         writer.write_failure(1, "ValueError: no", 2.5)
-        writer.reset([0])
+        writer.mark([0], PENDING)
         writer.write_result(0, second)
-        writer.reset([1])
+        writer.mark([1], PENDING)
         writer.write_result(1, fake_result(campaign, tasks[1]))
     Results(path).close()
     copy, seen, states = tmp_path / "copy.h5", set(), set()

@@ -9,7 +9,7 @@ from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tasks import Part
 from adhesis.ensemble.results.layout import Source, create
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import DATASETS, DONE
+from adhesis.ensemble.results.schema import DATASETS, DONE, PENDING
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
@@ -380,7 +380,7 @@ def test_states_without_contact_are_not_a_number():
     assert missing[1, 0] == (result["pull_off_penetration"] > -2.55)
 
 
-def test_only_first_realisations_keep_fields_through_reset_and_growth(tmp_path):
+def test_only_first_realisations_keep_fields_through_redo_and_growth(tmp_path):
     path = tmp_path / "r.h5"
     campaign = campaign_with("field_realisations = 2\n", realisations="3")
     results = {task: fake_result(campaign, task) for task in campaign.tasks()}
@@ -388,7 +388,7 @@ def test_only_first_realisations_keep_fields_through_reset_and_growth(tmp_path):
     with Writer(path) as writer:
         for row, task in enumerate(campaign.tasks()):
             writer.write_result(row, results[task])
-        writer.reset([1])
+        writer.mark([1], PENDING)
     larger = campaign_with(
         "field_realisations = 2\n", realisations="4", work_of_adhesion="[0.01, 0.02, 0.04]"
     )

@@ -32,13 +32,14 @@ from adhesis.ensemble.trace.answer import (
     run_plan,
 )
 from adhesis.ensemble.trace.answer import document as document_of
-from adhesis.ensemble.trace.figures import _tables as tables_of
 from adhesis.ensemble.trace.loops import Loops
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
+from adhesis.ensemble.trace.trace_page import _tables as tables_of
 from adhesis.ensemble.trace.trace_page import page_text, summary
 from adhesis.ensemble.trace.variants import TABLES, Plan, make_plan
 from benchmarks.trace_coverage import case, judged
+from tests.support.campaign_support import ranks_of
 from tests.support.figures import few_figures
 from tests.support.scenes import HALF_SPACE
 from tools.interrupted import Interrupt
@@ -463,7 +464,7 @@ def test_a_process_that_is_killed_is_said_and_replaced() -> None:
     def watch(loops: Loops) -> None:
         if not killed and loops.running:
             killed.extend(loops.running)
-            os.kill(loops.pids[-1], signal.SIGKILL)
+            os.kill(ranks_of(os.getpid())[-1], signal.SIGKILL)
 
     done = loops.run(watch, every=0.05)
     assert set(done) == {run.name for run in plan.runs}
@@ -485,10 +486,7 @@ def test_an_interrupt_ends_all_loops_of_a_trace(processes: int) -> None:
 
     with pytest.raises(Interrupt):
         loops.run(watch, every=0.05)
-    assert len(loops.pids) == processes
-    for pid in loops.pids:
-        with pytest.raises(ProcessLookupError):
-            os.kill(pid, 0)
+    assert ranks_of(os.getpid()) == []
 
 
 def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:

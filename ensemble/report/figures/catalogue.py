@@ -11,7 +11,6 @@ from adhesis.ensemble.campaign.tables import TURNING_POINTS, Axis
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import loss_figures
 from adhesis.ensemble.report.figures import shapes_and_spectra as fields
-from adhesis.ensemble.report.figures.along import along
 from adhesis.ensemble.report.figures.loops import contact_against_stress, loop_against_penetration
 from adhesis.ensemble.report.figures.loss_figures import FEWEST_FOR_A_LINE, hollow_handle
 from adhesis.ensemble.report.figures.shapes_and_spectra import (
@@ -240,4 +239,4 @@ def _along_axis(data: Aggregate, axis: Axis) -> Illustration:
     if len(further) > 1:
         caption += " Further axes beside these two stand at one value, as written below the panels."
     name, title = f"loss_along_{axis.name}", f"Loss against {axis.name}"
-    return Illustration(name, title, caption, partial(along, axis), whole=True)
+    return Illustration(name, title, caption, partial(loss_figures.along, axis), whole=True)

@@ -18,7 +18,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell, DeformedShape
+from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import style
@@ -55,20 +55,22 @@ def shapes(data: Aggregate) -> style.PublishedFigure:
         raise ValueError("no loop has kept its fields")
     cell, shape = found[0], found[0].fields.shape
     assert shape is not None
+    profile, surfaces = shape
     chosen = shown_penetrations(data, 3)
     height, ratios = (12 + 38 * len(chosen)) * style.MM, {"width_ratios": [2, 1]}
     figure = style.new_figure(
         len(chosen), 2, style.TWO_COLUMNS, height, sharex="col", gridspec_kw=ratios
     )
-    nodes, top = cell.plan.position.size, int(np.argmax(shape.height))
+    nodes, top = cell.plan.position.size, int(np.argmax(profile))
     # one and a half of the longest waves around the highest point, across the ends
     half = min(max(4, round(0.75 * nodes / cell.campaign.profile.n0)), nodes // 2)
     parts = (np.arange(nodes), np.arange(top - half, top + half))
     for (whole, detail), k in zip(figure.rows, chosen, strict=True):
         # in contact v = h - s, elsewhere v > h - s
-        separation = np.max(shape.height - shape.displacement[:, k], axis=-1)
+        separation = np.max(profile - surfaces[:, k], axis=-1)
+        gaps = surfaces[:, k] - profile + separation[:, None]
         for axes, part in zip((whole, detail), parts, strict=True):
-            _draw_shape(axes, cell.plan.position, shape, k, separation, part)
+            _draw_shape(axes, cell.plan.position, profile, gaps, part)
             # Ticks that follow the size of a panel change while the layout is found.
             axes.locator_params(axis="y", nbins=5)
         texts = dict.fromkeys(f"{1e6 * s:.2f}" for s in separation if np.isfinite(s))
@@ -202,9 +204,7 @@ def _spectra(panels: Sequence[Panel], handles: list[Line2D]) -> style.PublishedF
     return figure
 
 
-def _draw_shape(
-    axes: Axes, position: Array, shape: DeformedShape, k: int, separation: Array, part: Places
-) -> None:
+def _draw_shape(axes: Axes, position: Array, profile: Array, gaps: Array, part: Places) -> None:
     """Draw the nodes ``part``, counted on beyond the period where they exceed it.
 
     Each surface stands above the profile by its own gap. Few nodes, which would show as a polygon,
@@ -214,11 +214,10 @@ def _draw_shape(
     inside, fine = wide % position.size, -(-_FEWEST_NODES // position.size)
     nodes = np.linspace(part[0], part[-1], fine * (part.size - 1) + 1)
     x = 1e3 * nodes * (position[1] - position[0])
-    rigid = 1e6 * CubicSpline(wide, shape.height[inside])(nodes)
+    rigid = 1e6 * CubicSpline(wide, profile[inside])(nodes)
     axes.fill_between(x, rigid, rigid.min(), color="0.8", linewidth=0)
     axes.plot(x, rigid, color="0.4", linewidth=0.5, label="rigid")
-    for b, branch in enumerate(BRANCHES):
-        gap = shape.displacement[b, k] - shape.height + separation[b]
+    for branch, gap in zip(BRANCHES, gaps, strict=True):
         if np.all(np.isfinite(gap)):
             # monotone between nodes: contact stays contact, and nothing overlaps
             surface = rigid + 1e6 * PchipInterpolator(wide, gap[inside])(nodes)

@@ -11,7 +11,7 @@ import io
 import textwrap
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, TypeVar
@@ -26,7 +26,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
-from adhesis.ensemble.outputs import whole_file
+from adhesis.ensemble.files import whole_file
 from adhesis.solver.checks import counted, shown
 from adhesis.solver.model.jump import Branch
 
@@ -70,11 +70,9 @@ _LOOKS = (
 )
 
 
-@contextmanager
-def style() -> Iterator[None]:
-    """Use the style file inside the block only."""
-    with mpl.rc_context(fname=str(Path(__file__).with_name("adhesis.mplstyle"))):
-        yield
+def style() -> AbstractContextManager[None]:
+    """Return a context in which the style file is used."""
+    return mpl.rc_context(fname=str(Path(__file__).with_name("adhesis.mplstyle")))
 
 
 def look(k: int) -> dict[str, Any]:

@@ -10,9 +10,9 @@ import numpy as np
 
 from adhesis.ensemble.aggregate.average import SMALL, Aggregate, AveragedCell, fitted_slope
 from adhesis.ensemble.aggregate.cells import Cell, alike, difference
+from adhesis.ensemble.campaign.precision import FEWEST_FOR_SKEWNESS, interval_method
 from adhesis.ensemble.campaign.tables import Axis
 from adhesis.ensemble.escape import printable
-from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
 from adhesis.ensemble.quantities import UNITS, common_unit, percent, rounded_percent
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.further_axes import state_sign

@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 
 from adhesis.ensemble.errors import InputError, reason
 from adhesis.ensemble.escape import printable
-from adhesis.ensemble.regular_file import open_regular
+from adhesis.ensemble.files import open_regular
 from adhesis.solver import checks
 
 MOST_BYTES = 200_000_000

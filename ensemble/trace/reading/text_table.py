@@ -18,7 +18,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from adhesis.ensemble.errors import InputError, parameter
+from adhesis.ensemble.errors import InputError, parameter, quoted
 from adhesis.ensemble.quantities import LENGTH, in_plain_signs
 from adhesis.ensemble.trace.reading.missing_heights import may_be_code
 from adhesis.ensemble.trace.reading.source import Source
@@ -92,26 +92,73 @@ class Table:
         return form + (", decimal commas" if self.decimal == "," else "")
 
 
-def read_table(source: Source, delimiter: str | None = None, decimal: str | None = None) -> Table:
+def read_table(
+    source: Source,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+    *,
+    may_be_row: bool = False,
+) -> Table:
     """Read a text of numbers in columns, whatever its header, delimiter and decimal sign.
 
-    InputError if the file cannot be read, is no text, holds no columns of numbers or several blocks
-    of them, or can be read in two ways; the sentence says which line, and what would settle it.
+    ``may_be_row``: the numbers of one column may stand in one row. InputError if the file cannot be
+    read, is no text, holds no columns of numbers or several blocks of them, or can be read in two
+    ways; the sentence says which line, and what would settle it.
     """
-    return _table(source, _lines(source), delimiter, decimal)
-
-
-def read_column(source: Source, delimiter: str | None = None, decimal: str | None = None) -> Table:
-    """Read a text of one column, as :func:`read_table` does; its numbers may stand in one row."""
     lines = _lines(source)
-    rows = [place for place, line in enumerate(lines) if looks_like_numbers(line)]
-    if len(rows) == 1:
-        row = lines[rows[0]]
-        words = split(row, find_form(source, [row], delimiter, decimal)[0])
-        if len(words) > 1:
-            lines[rows[0] : rows[0] + 1] = words
+    sample = [line for line in lines if looks_like_numbers(line)]
+    if may_be_row and len(sample) == 1:
+        parts = split(sample[0], find_form(source, sample, delimiter, decimal)[0])
+        if len(parts) > 1:
+            place = lines.index(sample[0])
+            lines[place : place + 1] = parts
+            sample = [part for part in parts if looks_like_numbers(part)]
             delimiter = "|"  # none is left
-    return _table(source, lines, delimiter, decimal)
+    if not sample:
+        place = max(range(len(lines)), key=lambda k: sum(sign.isdigit() for sign in lines[k]))
+        raise InputError(
+            f"{source} holds no line of numbers: most digits stand on line {place + 1}, "
+            f"{quoted(lines[place].strip(), _SHOWN)}; take words, brackets and quotes about the "
+            "numbers out"
+        )
+    spread = sample[:: max(1, len(sample) // _SAMPLE)]
+    is_given = decimal is not None
+    above = "".join(lines[: lines.index(sample[0])][-1:])
+    delimiter, decimal = find_form(source, spread, delimiter, decimal, above)
+    count = Counter(len(split(line, delimiter)) for line in spread).most_common(1)[0][0]
+    reader = _Reader(source, lines, delimiter, decimal, count)
+    start = _first_row(reader)
+    if start is None:
+        _refuse_no_rows(reader, len(sample))
+    places = _block(reader, start)
+    _refuse_numbers_outside(reader, start, places[-1])
+    filled = tuple(k for k in range(count) if any(reader.rows[p].fields[k] for p in places))
+    rows = [reader.rows[place] for place in places]
+    columns = [[row.fields[k] for row in rows] for k in filled]
+    if not is_given:
+        refuse_thousands(source, columns, decimal)
+    for k, column in zip(filled, columns, strict=True):
+        numbers = [row.values[k] for row in rows]
+        words = [n for n, field in enumerate(column) if field.lower() in _MARKS]
+        if words and not all(f.lower() in _MARKS or is_missing(f) for f in column):
+            reader.refuse(places[words[0]], ": write NaN for a number that is missing, and no word")
+        _refuse_odd_ends(source, column, numbers, places, str(k), is_lone=len(filled) == 1)
+        if len(filled) == 1:
+            _refuse_dashes(reader, column, places)
+    header = [line[:_LONGEST_HEADER_LINE].strip(" \r\n").lstrip(COMMENT) for line in lines[:start]]
+    # Of one column, a line of the header is a name as a whole.
+    names = [
+        (line.strip(),) if count == 1 else _names(line, delimiter, count, filled) for line in header
+    ]
+    return Table(
+        columns=np.array([row.values for row in rows]).T.reshape(count, -1),
+        filled=filled,
+        header=tuple(filter(None, map(str.strip, header))),
+        fields=tuple(row for row in names if len(row) == count and any(row)),
+        lines=np.array(places) + 1,
+        delimiter=delimiter,
+        decimal=decimal,
+    )
 
 
 def _lines(source: Source) -> list[str]:
@@ -135,12 +182,6 @@ def _lines(source: Source) -> list[str]:
 
 
 # ---------------------------------------------------------------------- printed numbers
-
-
-def shown_line(line: str) -> str:
-    """Return a line of the file as a message shows it."""
-    line = line.strip()
-    return repr(line if len(line) <= _SHOWN else f"{line[:_SHOWN]}…")
 
 
 def looks_like_numbers(line: str) -> bool:
@@ -270,8 +311,8 @@ def _refuse_two_ways(source: Source, line: str, mend: str = "") -> NoReturn:
     both = ", or save it with semicolons between the numbers if they are both"
     mend = f"{mend}{both}" if mend else f"give {parameter('decimal')}"
     raise InputError(
-        f"{source} has rows such as {shown_line(line)}, whose commas can be decimal signs or "
-        f"delimiters: {mend}"
+        f"{source} has rows such as {quoted(line.strip(), _SHOWN)}, whose commas can be decimal "
+        f"signs or delimiters: {mend}"
     )
 
 
@@ -375,58 +416,8 @@ class _Reader:
 
     def refuse(self, place: int, sentence: str) -> NoReturn:
         """Raise InputError about a line."""
-        raise InputError(
-            f"line {place + 1} of {self.source} is {shown_line(self.lines[place])}{sentence}"
-        )
-
-
-def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
-    """Find header and columns in the lines of a file."""
-    sample = [line for line in lines if looks_like_numbers(line)]
-    if not sample:
-        place = max(range(len(lines)), key=lambda k: sum(sign.isdigit() for sign in lines[k]))
-        raise InputError(
-            f"{source} holds no line of numbers: most digits stand on line {place + 1}, "
-            f"{shown_line(lines[place])}; take words, brackets and quotes about the numbers out"
-        )
-    spread = sample[:: max(1, len(sample) // _SAMPLE)]
-    is_given = decimal is not None
-    above = "".join(lines[: lines.index(sample[0])][-1:])
-    delimiter, decimal = find_form(source, spread, delimiter, decimal, above)
-    count = Counter(len(split(line, delimiter)) for line in spread).most_common(1)[0][0]
-    reader = _Reader(source, lines, delimiter, decimal, count)
-    start = _first_row(reader)
-    if start is None:
-        _refuse_no_rows(reader, len(sample))
-    places = _block(reader, start)
-    _refuse_numbers_outside(reader, start, places[-1])
-    filled = tuple(k for k in range(count) if any(reader.rows[p].fields[k] for p in places))
-    rows = [reader.rows[place] for place in places]
-    columns = [[row.fields[k] for row in rows] for k in filled]
-    if not is_given:
-        refuse_thousands(source, columns, decimal)
-    for k, column in zip(filled, columns, strict=True):
-        numbers = [row.values[k] for row in rows]
-        words = [n for n, field in enumerate(column) if field.lower() in _MARKS]
-        if words and not all(f.lower() in _MARKS or is_missing(f) for f in column):
-            reader.refuse(places[words[0]], ": write NaN for a number that is missing, and no word")
-        _refuse_odd_ends(source, column, numbers, places, str(k), is_lone=len(filled) == 1)
-        if len(filled) == 1:
-            _refuse_dashes(reader, column, places)
-    header = [line[:_LONGEST_HEADER_LINE].strip(" \r\n").lstrip(COMMENT) for line in lines[:start]]
-    # Of one column, a line of the header is a name as a whole.
-    names = [
-        (line.strip(),) if count == 1 else _names(line, delimiter, count, filled) for line in header
-    ]
-    return Table(
-        columns=np.array([row.values for row in rows]).T.reshape(count, -1),
-        filled=filled,
-        header=tuple(filter(None, map(str.strip, header))),
-        fields=tuple(row for row in names if len(row) == count and any(row)),
-        lines=np.array(places) + 1,
-        delimiter=delimiter,
-        decimal=decimal,
-    )
+        line = quoted(self.lines[place].strip(), _SHOWN)
+        raise InputError(f"line {place + 1} of {self.source} is {line}{sentence}")
 
 
 def _first_row(reader: _Reader) -> int | None:
@@ -520,9 +511,9 @@ def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
         forms = {re.sub(r"[\d.,+\-\s]+", " ", line) for line in beside}
         if len(beside) == n and len(forms) == 1 < len(set(beside)):
             raise InputError(
-                f"{source} has lines such as {shown_line(beside[-1])} beside the rows of numbers, "
-                "which differ in their digits alone: remove them if they are none of the rows, and "
-                "correct them if they are"
+                f"{source} has lines such as {quoted(beside[-1].strip(), _SHOWN)} beside the rows "
+                "of numbers, which differ in their digits alone: remove them if they are none of "
+                "the rows, and correct them if they are"
             )
 
 

@@ -1,4 +1,8 @@
-"""Output files of a command: checked before any work, written whole or not at all.
+"""Files of a command: read without waiting, checked before any work, written whole or not at all.
+
+Of what is read, a pipe, socket or device in the place of a file is refused: a pipe that nobody
+writes to would hold a program up until it is killed, and a device that has no end would fill its
+memory.
 
 A command lists its outputs, each with the option that names it, and has them checked before it
 computes. A regular file is written beside its place and renamed. A stream of the process
@@ -17,14 +21,11 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from io import BufferedReader
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
-from adhesis.ensemble.errors import InputError, WriteError, one_of, reason, refusal
-from adhesis.ensemble.regular_file import irregular
-
-if TYPE_CHECKING:
-    import xarray as xr
+from adhesis.ensemble.errors import InputError, WriteError, quoted, reason, refusal
 
 # Other names of an open descriptor of this process; to rename a file over them would destroy them.
 _DESCRIPTOR = re.compile(r"/dev/(?:(stdin|stdout|stderr)|fd/(\d+))|/proc/self/fd/(\d+)")
@@ -33,6 +34,52 @@ _NEW_TERMINAL = os.makedev(5, 2)  # /dev/ptmx: opening it makes a terminal
 # Folders that are being written to, for a signal that ends the process at once.
 _unfinished: set[Path] = set()
 _STANDARD = {"stdin": 0, "stdout": 1, "stderr": 2}
+
+
+# A pipe that takes the place of the file after it was looked at is opened without waiting, too.
+_WITHOUT_WAITING = os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
+_KINDS = (
+    (stat.S_ISDIR, "a directory"),
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+def irregular(mode: int) -> str | None:
+    """Return what a file with this mode is ("a pipe"); None for a regular file."""
+    if stat.S_ISREG(mode):
+        return None
+    return next((kind for holds, kind in _KINDS if holds(mode)), "no ordinary file")
+
+
+def open_regular(path: Path | str) -> BufferedReader:
+    """Open a file to read (OSError), if it is a regular one (InputError)."""
+    try:
+        mode = os.stat(path).st_mode
+    except ValueError:  # a NUL, or characters that no name has
+        raise InputError(f"{quoted(str(path))} is not the name of a file") from None
+    _refuse(path, mode)  # before it is opened, which some devices take for a command
+    descriptor = os.open(path, os.O_RDONLY | _WITHOUT_WAITING)
+    try:
+        _refuse(path, os.fstat(descriptor).st_mode)
+        return os.fdopen(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def _refuse(path: Path | str, mode: int) -> None:
+    kind = irregular(mode)
+    if kind is not None:
+        raise InputError(
+            f"{path} is {kind}, not a file"
+            + (": write its content to a file first" if kind != "a directory" else "")
+        )
+
+
+# ---------------------------------------------------------------------- outputs
 
 
 def target_of(path: Path | str) -> Path:
@@ -89,7 +136,8 @@ def check_outputs(outputs: Mapping[str, Path], inputs: Mapping[str, Path]) -> No
 def check_ending(option: str, path: Path, *endings: str) -> None:
     """Refuse the name of a file with another ending, in small letters or capitals (InputError)."""
     if path.suffix.lower() not in endings:
-        raise InputError(f"{option} is {path}: the name must end in {one_of(endings)}")
+        names = " or ".join(", ".join(endings).rsplit(", ", 1))
+        raise InputError(f"{option} is {path}: the name must end in {names}")
 
 
 def check_output_folder(
@@ -231,17 +279,6 @@ def write_json(path: Path, document: dict[str, Any]) -> None:
     """Write a document whole or not at all (OSError)."""
     with whole_file(path) as stream:
         stream.write((json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
-
-
-def write_netcdf(path: Path, dataset: xr.Dataset) -> None:
-    """Write a dataset as netCDF 4, whole or not at all (OSError).
-
-    It is made in memory: HDF5 reports a full disk when the file is closed, and ends the process
-    with a segmentation fault where the library closes it at exit.
-    """
-    # Released at once: the view of a stream that an error keeps alive is reported at the exit.
-    with memoryview(dataset.to_netcdf(None, engine="h5netcdf")) as data, whole_file(path) as stream:
-        stream.write(data)
 
 
 @contextmanager
