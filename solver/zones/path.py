@@ -13,10 +13,12 @@ from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.zones.descent import Descent, Minimum
+from adhesis.solver.zones.surface import sharpened
 
 _FINEST = 1e-3  # of γ, or the accuracy: unit of the next two
 _SMOOTH = 0.1  # of the unit, shared by the range: loss of a step that counts as none
 _NOISE = 0.01  # of the unit: loss of a step by a node that comes into contact or zone
+_BENT = 0.2  # of what ΔY Δx is off the slopes: counts as a loss of a step
 _LOCATED = 0.3  # of the accuracy times the drop, or of the noise: work within which a jump lies
 _LONGEST = 0.05  # of the range: jumps hide in longer steps
 _NEAREST = 1e-9  # of the range: shortest step
@@ -27,9 +29,10 @@ class Steps:
     """Steps of one call of ``follow``, with location of the jumps.
 
     Let L be what a step loses: the fall of the potential W less ∫ Y dx, by stresses and their
-    slopes at both its ends. On a branch L is of fifth order in the step. A step with a larger one
-    is halved until the work |ΔY Δx| within which the jump lies is small beside its drop. A descent
-    on the way to that is ended as soon as W is below what a branch may have.
+    slopes at both its ends. On a branch L is of fifth order in the step, and ΔY less that of the
+    slopes of third order: a jump may hide in one of both. A step with a larger one is halved until
+    the work |ΔY Δx| within which the jump lies is small beside its drop. A descent on the way to
+    that is ended as soon as W is below what a branch may have.
     """
 
     def __init__(self, problem: Problem, descent: Descent, accuracy: float, branch: Branch) -> None:
@@ -75,10 +78,12 @@ class Steps:
             loss -= (self._conjugate(here) + 0.5 * change) * step
             smooth = loss + (slope_after - slope) * step**2 / 12
             allowed = self.unit * (_SMOOTH * abs(step) / self.scale + _NOISE)
-            within = abs(change * step)
+            bent = abs((change - 0.5 * (slope + slope_after) * step) * step)
+            within = max(abs(change * step), bent)
             begins_or_ends = (after.adhesion == 0) != (here.adhesion == 0)
             # on a branch on which Y rises or falls the trapezoidal rule is off by half of that
-            if begins_or_ends or max(abs(smooth), loss - 0.5 * within) > allowed:
+            by_rule = loss - 0.5 * abs(change * step)
+            if begins_or_ends or max(abs(smooth), by_rule, _BENT * bent) > allowed:
                 located = _LOCATED * max(self.accuracy * abs(loss), _NOISE * self.unit)
                 if (lost or within > located) and abs(step) > _NEAREST * self.scale:
                     # the separation at the loss of contact varies as a square root of the load
@@ -87,6 +92,7 @@ class Steps:
                     step *= 0.5
                     continue
                 self._jump(here, after, (slope, slope_after), lost)
+                self.error += 0.0 if lost else within
                 if lost:
                     return
                 step, least = whole, self.accuracy * self.scale
@@ -154,8 +160,6 @@ class Steps:
             before, end, self.branch, self.surface.period, opens=opens, falls_off=lost
         )
         self.jumps.append(jump)
-        change = 0.0 if lost else self._conjugate(after) - self._conjugate(here)
-        self.error += abs(change * step)
 
     def state_of(self, here: Minimum, slope: float) -> ContactState:
         """Make the contact state of a minimum with dY/dx = ``slope``.
@@ -171,7 +175,7 @@ class Steps:
         edges = np.column_stack([first - 1 + left, first + width - right])
         length = float((edges[:, 1] - edges[:, 0]).sum())
         if not contact.any():
-            first, width = patch_ranges(here.gap < surface.range)
+            first, width = patch_ranges(sharpened(here.gap) < surface.range)
             edges = np.column_stack([first - 0.5, first + width - 0.5])
         edges = edges * surface.dx
         edges += surface.period * ((edges[:, :1] < 0) * 1.0 - (edges[:, :1] >= surface.period))
