@@ -45,27 +45,14 @@ def wave_loop(alpha: float, share: float, **numbers: float) -> LoopResult:
 def test_a_wave_loses_what_dugdales_law_has_it_lose(alpha, share):
     wave, loop = wave_of(alpha), wave_loop(alpha, share)
     exact = DugdaleWave(wave, share * A).loss
-    # at α = 0.1 steps that lose less than is seen as a jump add up to the estimated error
-    most = (2 if alpha == 0.1 else 1) * loop.loss_error
-    assert abs(loop.loss - exact) < most < 0.025 * wave.loop.loss
-    assert abs(loop.loss_from_drops - exact) < min(most, 0.01 * wave.loop.loss)
-    assert [jump.kind for jump in loop.jumps if jump.energy_drop > 0.01 * exact] == [
-        "snap-in",
-        "pull-off",
-    ]
+    assert abs(loop.loss - exact) < loop.loss_error < 2e-3 * wave.loop.loss
+    assert abs(loop.loss_from_drops - exact) < loop.loss_error
+    kinds = [jump.kind for jump in loop.jumps if jump.energy_drop > 0.01 * exact]
+    assert kinds == ["snap-in", "pull-off"]
     assert loop.jumps[0].separation == pytest.approx((1 + share) * A, abs=5e-3 * A)
     assert loop.range_warnings() == []
-
-
-@pytest.mark.parametrize(
-    ("alpha", "share"),
-    [(0.1, 0.05), (0.1, 0.1), (0.1, 0.2), (0.3, 0.1), (0.3, 0.2), (0.5, 0.2)],
-)
-def test_a_wave_with_many_nodes_loses_it_to_a_part_in_ten_thousand(alpha, share):
-    """Of the loss at zero range."""
-    loop = wave_loop(alpha, share, nodes_per_wave=1024, accuracy=1e-4)
-    exact = DugdaleWave(wave_of(alpha), share * A).loss
-    assert abs(loop.loss_from_drops - exact) < 1e-4 * wave_of(alpha).loop.loss
+    fine = wave_loop(alpha, share, nodes_per_wave=1024, accuracy=1e-4)
+    assert abs(fine.loss_from_drops - exact) < 1e-4 * wave.loop.loss
 
 
 def test_the_loss_of_a_wave_converges_with_the_square_of_the_nodes():
@@ -96,8 +83,8 @@ def test_states_are_those_of_dugdales_branch(share):
     for i in unloading[:: len(unloading) // 4]:
         half = 0.5 * loop.contact_fraction[i] * PERIOD
         s, p = exact.state(half)
-        assert s == pytest.approx(loop.separation[i], abs=4e-3 * A)
-        assert p == pytest.approx(loop.mean_stress[i], abs=2e-3 * wave_of(0.3).full_contact_stress)
+        assert s == pytest.approx(loop.separation[i], abs=1e-3 * A)
+        assert p == pytest.approx(loop.mean_stress[i], abs=5e-4 * wave_of(0.3).full_contact_stress)
 
 
 @pytest.mark.parametrize("control", [Control(3e9), Control(5e8), Control(0.0)])
