@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.lattice import Lattice
-from adhesis.solver.grid.patches import patch_ranges
 from adhesis.solver.model.profile import Array
+from adhesis.solver.peaks import patch_ranges
 
 Indices = NDArray[np.intp]
 

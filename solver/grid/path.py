@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver.grid.contact import Contact
-from adhesis.solver.grid.patches import patch_ranges
 from adhesis.solver.grid.relax import Relaxation
 from adhesis.solver.grid.states import state_of
 from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
+from adhesis.solver.peaks import patch_ranges
 
 # Relative error of a drop times the number of nodes in half the first equilibrium width on a crest
 # of rms curvature. How often it holds: docs/methods.md, "How far the reported error holds".

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.lattice import Lattice
-from adhesis.solver.grid.patches import patch_ranges
 from adhesis.solver.method import ContactState
+from adhesis.solver.peaks import patch_ranges
 
 EDGE_OFFSET = 0.190
 """An edge lies this many dx inside the outer face of its contact node (numerical calibration of the

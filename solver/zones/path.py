@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver.grid.patches import patch_ranges
 from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
+from adhesis.solver.peaks import patch_ranges
 from adhesis.solver.zones.descent import Descent, Minimum
 from adhesis.solver.zones.surface import sharpened
 
