@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from importlib import import_module
 from typing import Literal, get_args
 
@@ -77,18 +78,10 @@ def make_method(
         name, reason = choose(problem, nodes_per_wave)
         chosen = f"{asked}: {name}, {reason}"
     # an interrupted import leaves incomplete modules behind
-    uninterrupted(import_module)(f"adhesis.solver.{name}.method")
-    if name == "sharp":
-        from adhesis.solver.sharp.method import SharpMethod
-
-        return SharpMethod(problem, accuracy=accuracy, chosen=chosen)
-    if name == "zones":
-        from adhesis.solver.zones.method import ZonesMethod
-
-        return ZonesMethod(problem, nodes_per_wave=nodes_per_wave, accuracy=accuracy, chosen=chosen)
-    from adhesis.solver.grid.method import GridMethod
-
-    return GridMethod(problem, nodes_per_wave=nodes_per_wave, accuracy=accuracy, chosen=chosen)
+    module = uninterrupted(import_module)(f"adhesis.solver.{name}.method")
+    nodes = {} if name == "sharp" else {"nodes_per_wave": nodes_per_wave}
+    kind: Callable[..., Method] = getattr(module, f"{name.capitalize()}Method")
+    return kind(problem, accuracy=accuracy, chosen=chosen, **nodes)
 
 
 def check_law(name: MethodName, nodes_per_wave: int | None, *, pins: bool, has_range: bool) -> None:

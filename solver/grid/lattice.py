@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.grid.compliance import EdgeCompliance
 from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.elasticity import ElasticGrid
-from adhesis.solver.model.control import Control
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 
 
-@dataclass(frozen=True, eq=False)
 class Lattice:
-    """A problem discretised on n equally spaced nodes; arrays have the shape (n,).
+    """A problem discretised on n equally spaced nodes, dx apart in m; arrays have the shape (n,).
 
     Attributes
     ----------
@@ -31,40 +27,17 @@ class Lattice:
         Of the period.
     """
 
-    elastic: ElasticGrid
-    compliance: EdgeCompliance
-    height: Array
-    adhesion: Array
-    control: Control
-    h_max: float
-    origin: int
-    equal_parts: int
-
-    @classmethod
-    def of(cls, problem: Problem, n: int) -> Lattice:
-        """Make the lattice of ``n`` nodes in one period of the problem's profile."""
+    def __init__(self, problem: Problem, n: int) -> None:
         profile = problem.profile
-        elastic = ElasticGrid(n, profile.period, problem.half_space.modulus)
-        return cls(
-            elastic,
-            EdgeCompliance(elastic.kernel()),
-            profile.heights(n),
-            problem.toughness(elastic.dx * np.arange(n, dtype=np.float64), profile.slopes(n)),
-            problem.control,
-            profile.h_max,
-            round(problem.first_crest / elastic.dx) % n,
-            problem.equal_parts,
-        )
-
-    @property
-    def n(self) -> int:
-        """Number of nodes."""
-        return self.elastic.n
-
-    @property
-    def dx(self) -> float:
-        """Distance of two nodes, in m."""
-        return self.elastic.dx
+        self.elastic = ElasticGrid(n, profile.period, problem.half_space.modulus)
+        self.n, self.dx = n, self.elastic.dx
+        self.compliance = EdgeCompliance(self.elastic.kernel())
+        self.height = profile.heights(n)
+        x = self.dx * np.arange(n, dtype=np.float64)
+        self.adhesion = problem.toughness(x, profile.slopes(n))
+        self.control, self.h_max = problem.control, profile.h_max
+        self.origin = round(problem.first_crest / self.dx) % n
+        self.equal_parts = problem.equal_parts
 
     def extra_compliance(self, contact: Contact, nodes: NDArray[np.intp]) -> tuple[float, Array]:
         """Compute c and g of the compliance c g gᵀ that a free separation adds; c = 0 at fixed s.

@@ -53,7 +53,7 @@ class Relaxation:
     tight = 1e-4
 
     def __init__(self, problem: Problem, nodes: int) -> None:
-        self.lattice = lattice = Lattice.of(problem, nodes)
+        self.lattice = lattice = Lattice(problem, nodes)
         # The largest gap that adhesion closes beside an edge, at least the height of a crest of rms
         # curvature within half a node.
         modulus, curvature = problem.half_space.modulus, float(np.sqrt(problem.profile.m4))
