@@ -1,8 +1,9 @@
-"""Compute the energy of moving each edge of a contact set by one node."""
+"""Edges of a contact set: their moves, and the energy of moving each by one node."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,20 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.peaks import patch_ranges
 
 Indices = NDArray[np.intp]
+
+Key = tuple[int, ...]
+"""Identifies a move: side of the first edge, the nodes of one or two edges, direction."""
+
+
+class Move(NamedTuple):
+    """One edge's move by ``length`` nodes, or none, outwards (``direction`` +1) or inwards (-1)."""
+
+    edge: int
+    direction: int
+    length: int
+    release: float
+    key: Key
+    carried: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from adhesis.solver.grid.contact import Contact
-from adhesis.solver.grid.edges import Edges
+from adhesis.solver.grid.edges import Edges, Key, Move
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.pairs import pairs
 
@@ -17,9 +17,6 @@ _TIE = 1e-6
 # Least released energy of a move, as a share of γ' dx: smaller ones are within the error of S by
 # lumping.
 _MARGIN = 1e-4
-
-Key = tuple[int, ...]
-"""Identifies a move: side of the first edge, the nodes of one or two edges, direction."""
 
 
 class Motion(NamedTuple):
@@ -32,17 +29,6 @@ class Motion(NamedTuple):
 
 EdgeMotions = dict[tuple[int, int], Motion]
 """Last motion of each edge, by its side and contact node."""
-
-
-class Move(NamedTuple):
-    """One edge's move by ``length`` nodes, or none, outwards (``direction`` +1) or inwards (-1)."""
-
-    edge: int
-    direction: int
-    length: int
-    release: float
-    key: Key
-    carried: float = 0.0
 
 
 def least_release(lattice: Lattice) -> float:
@@ -121,14 +107,14 @@ def pair_moves(
     """
     margin = least_release(lattice)
     found = pairs(contact, edges, lattice)
-    found = [p for p in found if p.release > margin and p.key(edges) not in blocked]
+    found = [both for both in found if both[0].release > margin and both[0].key not in blocked]
     if not found:
         return []
-    most = max(p.release for p in found)
-    tied = [p for p in found if p.release >= most * (1 - _TIE)]
+    most = max(first.release for first, _ in found)
+    tied = [both for both in found if both[0].release >= most * (1 - _TIE)]
     if one_pair:
-        tied = [min(tied, key=lambda p: _position(edges, p.edges[0], lattice))]
-    return [Move(edge, p.direction, 1, p.release, p.key(edges)) for p in tied for edge in p.edges]
+        tied = [min(tied, key=lambda both: _position(edges, both[0].edge, lattice))]
+    return [move for both in tied for move in both]
 
 
 def _position(edges: Edges, edge: int, lattice: Lattice) -> int:

@@ -8,10 +8,8 @@ adding the pair costs ½ dx tᵀ S⁻¹ t, removing it releases ½ dx σᵀ S σ
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from adhesis.solver.grid.contact import Contact
-from adhesis.solver.grid.edges import Edges, Indices
+from adhesis.solver.grid.edges import Edges, Indices, Move
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.model.profile import Array
 
@@ -19,25 +17,10 @@ from adhesis.solver.model.profile import Array
 COUPLING = 0.6
 
 
-@dataclass(frozen=True)
-class Pair:
-    """Two edges (indices into ``Edges``) that move by one node each.
+def pairs(contact: Contact, edges: Edges, lattice: Lattice) -> list[tuple[Move, Move]]:
+    """Compute the moves by one node of the pairs of edges of every patch and gap.
 
-    ``direction`` is +1 outwards, -1 inwards; ``release`` the energy in J/m.
-    """
-
-    edges: tuple[int, int]
-    direction: int
-    release: float
-
-    def key(self, edges: Edges) -> tuple[int, ...]:
-        """Return the identifier of this move: side of its first edge, both nodes, direction."""
-        one, two = self.edges
-        return int(edges.side[one]), int(edges.inner[one]), int(edges.inner[two]), self.direction
-
-
-def pairs(contact: Contact, edges: Edges, lattice: Lattice) -> list[Pair]:
-    """Compute the energies released by the pairs of edges of every patch and gap (J/m).
+    Both moves of a pair have the energy in J/m that the pair releases.
 
     Pairs that cannot release energy with any possible coupling in S are skipped.
     """
@@ -47,7 +30,7 @@ def pairs(contact: Contact, edges: Edges, lattice: Lattice) -> list[Pair]:
     t = lattice.gap(contact, edges.outer)
     pull = contact.stress[edges.inner]
     factor, gap_rate = lattice.extra_compliance(contact, edges.outer)
-    found: list[Pair] = []
+    found: list[tuple[Move, Move]] = []
 
     def may_release(one: int, two: int, cost: Array, nodes: Indices) -> bool:
         """Return False if the pair cannot release energy with a coupling up to ``COUPLING``."""
@@ -68,7 +51,9 @@ def pairs(contact: Contact, edges: Edges, lattice: Lattice) -> list[Pair]:
             a, b = float(pull[one]), float(pull[two])
             form = s11 * a * a + 2 * s12 * a * b + s22 * b * b
             release = dx * (0.5 * form - adhesive)
-        found.append(Pair((one, two), direction, release))
+        key = int(edges.side[one]), int(edges.inner[one]), int(edges.inner[two]), direction
+        first, second = (Move(edge, direction, 1, release, key) for edge in (one, two))
+        found.append((first, second))
 
     for k in range(count):
         w, a, b = int(width[k]), int(left[k]), int(right[k])

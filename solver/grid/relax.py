@@ -11,12 +11,10 @@ from collections.abc import Callable
 import numpy as np
 
 from adhesis.solver.grid.contact import EDGE_COMPLIANCE, Contact, ContactSolver
-from adhesis.solver.grid.edges import Edges, Indices, survey
+from adhesis.solver.grid.edges import Edges, Indices, Key, Move, survey
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.moves import (
     EdgeMotions,
-    Key,
-    Move,
     apply_moves,
     edge_moves,
     join_overlaps,

@@ -7,11 +7,11 @@ from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
 from adhesis.solver.grid import relax
 from adhesis.solver.grid.compliance import EdgeCompliance
 from adhesis.solver.grid.contact import Contact, ContactSolver
-from adhesis.solver.grid.edges import survey
+from adhesis.solver.grid.edges import Move, survey
 from adhesis.solver.grid.elasticity import ElasticGrid
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.method import GridMethod
-from adhesis.solver.grid.moves import Move, edge_moves, pair_moves
+from adhesis.solver.grid.moves import edge_moves, pair_moves
 from adhesis.solver.model.control import Control
 from tests.support.scenes import HALF_SPACE, grid_of
 
