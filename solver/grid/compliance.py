@@ -103,7 +103,20 @@ class EdgeCompliance:
             key = tuple(_rounded(k) for k in (width, gap, near, far_gap, far))
         known = self._known.get(key)
         if known is None:
-            known = self._known[key] = self._compute(key)
+            width, gap, next_width, other_gap, other_width = key
+            # Rounded lengths must not reach round the period.
+            gap = min(gap, self.n - 1)
+            other_gap = min(other_gap, self.n - gap)
+            width = min(width, self.n - gap - other_gap)
+            free = self.n - gap - width - other_gap
+            next_width = min(next_width, free)
+            other_width = min(other_width, free - next_width)
+            blocks = [(0, -1, _fine_both(width))]  # of the patch, which starts beside the node at 0
+            if next_width > 0:
+                blocks.append((gap, 1, _fine_near(next_width)))
+            if other_width > 0:
+                blocks.append((-width - other_gap, -1, _fine_near(other_width)))
+            known = self._known[key] = float(self._schur(blocks, (0,))[0, 0])
         return known
 
     def _rounded_patch(self, width: int) -> tuple[int, ...]:
@@ -158,23 +171,6 @@ class EdgeCompliance:
                 blocks.append((gap, 1, _fine_both(far)))
             known = self._pairs[key] = self._schur(blocks, (0, gap - 1))
         return known
-
-    def _compute(self, key: tuple[int, ...]) -> float:
-        """Compute the Schur complement of the node at 0; the patch starts at -1."""
-        width, gap, next_width, other_gap, other_width = key
-        # Rounded lengths must not reach round the period.
-        gap = min(gap, self.n - 1)
-        other_gap = min(other_gap, self.n - gap)
-        width = min(width, self.n - gap - other_gap)
-        free = self.n - gap - width - other_gap
-        next_width = min(next_width, free)
-        other_width = min(other_width, free - next_width)
-        blocks = [(0, -1, _fine_both(width))]
-        if next_width > 0:
-            blocks.append((gap, 1, _fine_near(next_width)))
-        if other_width > 0:
-            blocks.append((-width - other_gap, -1, _fine_near(other_width)))
-        return float(self._schur(blocks, (0,))[0, 0])
 
     def _schur(
         self, patches: list[tuple[int, int, tuple[int, ...]]], nodes: tuple[int, ...]

@@ -238,12 +238,10 @@ def _way_beyond(
     return way if way < longest else math.inf
 
 
-def least_range(
-    valid_range: Any, edge_range: Any, touch_range: Any, turn_range: Any
-) -> NDArray[np.float64]:
+def least_range(*ranges: Any) -> NDArray[np.float64]:
     """Return the least of the four ranges, in m; one that is unknown (NaN) does not count."""
-    ranges = np.broadcast_arrays(valid_range, edge_range, touch_range, turn_range)
-    return np.asarray(np.fmin.reduce(np.array(ranges, dtype=np.float64)), dtype=np.float64)
+    found = np.fmin.reduce(np.array(np.broadcast_arrays(*ranges), dtype=np.float64))
+    return np.asarray(found, dtype=np.float64)
 
 
 def limit_text(
