@@ -72,43 +72,35 @@ def openings_between(
     The interpolant (monotone cubic) is that of t/sqrt((x - l)(r - x)), which is smooth across a gap
     (l, r) and known at both edges: ``coefficient`` is t/sqrt(r) at each edge in sqrt(m).
     """
+    # imported here: it takes half of the start-up time of commands that compute nothing
+    from scipy.interpolate import PchipInterpolator
+
     out = []
     for k, (_, left) in enumerate(edges):
         after = (k + 1) % len(edges)
         right = edges[after, 0] + (period if after == 0 else 0.0)
-        out.append(
-            _opening(left, right, (coefficient[k, 1], coefficient[after, 0]), fields, period)
-        )
+        first = left + (fields.x - left) % period
+        order = np.argsort(first)
+        x, t = first[order], fields.gap[order]
+        # A node within rounding of an edge adds no information.
+        inside = (x > left + 1e-9 * period) & (x < right - 1e-9 * period) & (t > 0)
+        x, t = x[inside], t[inside]
+        width = right - left
+        shape = t / np.sqrt((x - left) * (right - x)) * np.sqrt(width)
+        shape = np.concatenate([coefficient[k, 1:], shape, coefficient[after, :1]])
+        x = np.concatenate([[left], x, [right]])
+        smooth = PchipInterpolator(x, shape)
+        intervals = x.size - 1
+        beside = np.minimum(np.arange(intervals), np.arange(intervals)[::-1]) < _NEAR
+        share = np.sin(0.5 * np.pi * np.arange(_POINTS) / _POINTS) ** 2  # dense towards both ends
+        fine = [
+            x[i] + (x[i + 1] - x[i]) * share if beside[i] else x[i : i + 1]
+            for i in range(intervals)
+        ]
+        points = np.concatenate([*fine, [right]])
+        root = np.sqrt((points - left) * (right - points) / width)
+        out.append(Opening(points, smooth(points) * root))
     return out
-
-
-def _opening(
-    left: float, right: float, ends: tuple[float, float], fields: Fields, period: float
-) -> Opening:
-    first = left + (fields.x - left) % period
-    order = np.argsort(first)
-    x, t = first[order], fields.gap[order]
-    # A node within rounding of an edge adds no information.
-    inside = (x > left + 1e-9 * period) & (x < right - 1e-9 * period) & (t > 0)
-    x, t = x[inside], t[inside]
-    width = right - left
-    shape = np.concatenate(
-        [[ends[0]], t / np.sqrt((x - left) * (right - x)) * np.sqrt(width), [ends[1]]]
-    )
-    x = np.concatenate([[left], x, [right]])
-    # imported here: it takes half of the start-up time of commands that compute nothing
-    from scipy.interpolate import PchipInterpolator
-
-    smooth = PchipInterpolator(x, shape)
-    intervals = x.size - 1
-    beside = np.minimum(np.arange(intervals), np.arange(intervals)[::-1]) < _NEAR
-    share = np.sin(0.5 * np.pi * np.arange(_POINTS) / _POINTS) ** 2  # dense towards both ends
-    fine = [
-        x[i] + (x[i + 1] - x[i]) * share if beside[i] else x[i : i + 1] for i in range(intervals)
-    ]
-    points = np.concatenate([*fine, [right]])
-    root = np.sqrt((points - left) * (right - points) / width)
-    return Opening(points, smooth(points) * root)
 
 
 def spectral_density(values: Array, period: float) -> Array:
