@@ -32,9 +32,9 @@ from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.runtime.threads import one_at_a_time
 from adhesis.solver.sharp.adhesion import adhesion_of, check_adhesion, symmetry_of
 from adhesis.solver.sharp.continuation.branch import Resolution, Target
+from adhesis.solver.sharp.continuation.descent import FullContact, NoState
 from adhesis.solver.sharp.continuation.follower import Follower
 from adhesis.solver.sharp.continuation.jump import Event, History
-from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.patch_tension import InnerTension
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource

@@ -22,8 +22,7 @@ from adhesis import (
     single_wave,
 )
 from adhesis.solver.method import Method, PathError
-from adhesis.solver.sharp.continuation.descent import Descents
-from adhesis.solver.sharp.errors import NoState
+from adhesis.solver.sharp.continuation.descent import Descents, NoState
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.exact_wave import ExactWave
 from tests.support.scenes import HALF_SPACE, grid_of, loop_of, rough

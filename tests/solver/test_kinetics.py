@@ -8,9 +8,8 @@ import pytest
 
 from adhesis import Control, Problem, Profile, run_loop
 from adhesis.solver.grid.method import GridMethod
-from adhesis.solver.sharp.continuation.descent import leaving_step
+from adhesis.solver.sharp.continuation.descent import NoState, leaving_step
 from adhesis.solver.sharp.continuation.jump import Jumps
-from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.scenes import HALF_SPACE as SOLID
 from tests.support.scenes import grid_of, loop_of, loops_at, of_paper, rough

@@ -7,8 +7,8 @@ import pytest
 
 from adhesis import Control, PathError, Problem, Profile, make_method, run_path, single_wave
 from adhesis.solver.references.single_wave import SingleWave
+from adhesis.solver.sharp.continuation.descent import NoState
 from adhesis.solver.sharp.continuation.follower import Follower
-from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.scenes import HALF_SPACE as SOLID
 from tests.support.scenes import loop_of, rough

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.linalg import norm
 
 from adhesis.solver._kernels import CLOSING_SHARE, DescentEvent, EdgeLaw
+from adhesis.solver.method import PathError
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.threads import one_thread
-from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.gap.ends import (
     lengths_of,
     move_edges,
@@ -33,6 +33,19 @@ from adhesis.solver.sharp.tolerances import (
     OTHER_MINIMUM,
     RESTS,
 )
+
+
+class FullContact(Exception):
+    """Error raised when the last gap of the period closes: no state with a gap is left."""
+
+
+class NoState(PathError):
+    """Error raised when the path has no state at ``d``; the text is the reason."""
+
+    def __init__(self, reason: str, d: float) -> None:
+        super().__init__(reason)
+        self.d = d
+
 
 Rival = Point | None | FullContact | NoState
 """Another end of a descent: a minimum, no contact, full contact (with a stiffness), or unknown."""

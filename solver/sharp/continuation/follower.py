@@ -19,6 +19,7 @@ from adhesis.solver.sharp.continuation.branch import (
     StableBranch,
     Target,
 )
+from adhesis.solver.sharp.continuation.descent import NoState
 from adhesis.solver.sharp.continuation.jump import (
     ComputedJump,
     Event,
@@ -26,7 +27,6 @@ from adhesis.solver.sharp.continuation.jump import (
     History,
     Jumps,
 )
-from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.gap.ends import lengths_of, move_edges, positions, step_limits
 from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
 from adhesis.solver.sharp.nucleation.nucleation import Located, Nucleation

@@ -10,8 +10,7 @@ import numpy as np
 from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.continuation.descent import Descents, Rival
-from adhesis.solver.sharp.errors import FullContact, NoState
+from adhesis.solver.sharp.continuation.descent import Descents, FullContact, NoState, Rival
 from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.output.contact_states import States
