@@ -20,7 +20,6 @@ import numpy as np
 
 from adhesis.solver._kernels import FieldModel, set_up_response, solve_field
 from adhesis.solver.model.profile import Array, self_affine_profile
-from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import FIXED_SEPARATION, EdgeMechanics
 
@@ -53,7 +52,6 @@ def main() -> None:
     parser.add_argument("--tolerance", type=float, default=1e-5)
     parser.add_argument("--repetitions", type=int, default=5)
     given = parser.parse_args()
-    keep_freed()  # as in a loop
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, h_rms=1e-6, seed=1)
     source = StressSource(profile, given.tolerance)
     separation, digits = 0.5 * profile.h_max * profile.q0, -np.log(given.tolerance)

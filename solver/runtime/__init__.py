@@ -1,1 +1,1 @@
-"""The running program: threads, signals, memory."""
+"""The running program: threads and signals."""

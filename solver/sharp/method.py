@@ -28,7 +28,6 @@ from adhesis.solver.method import (
     PathError,
 )
 from adhesis.solver.model.problem import Problem
-from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.runtime.threads import one_at_a_time
 from adhesis.solver.sharp.adhesion import adhesion_of, check_adhesion, symmetry_of
 from adhesis.solver.sharp.continuation.branch import Resolution, Target
@@ -136,7 +135,6 @@ class SharpMethod(Method):
     ) -> None:
         super().__init__(problem, chosen=chosen)
         check_range(problem)
-        keep_freed()
         profile, modulus = problem.profile, problem.half_space.modulus
         self.accuracy = accuracy
         self.q0 = profile.q0
