@@ -400,6 +400,9 @@ class EquilibriumPath(ByValue, ResultViews):
             f"{self.patches.max()}"
         )
         energies = problem.full_contact_energy, problem.work_of_adhesion
+        raced = f"{counted(self.races, 'jump')} raced, {self.energy_at_stake:.3g} J/m² at stake"
+        if math.isinf(self.narrowest_length):
+            raced = "races are not looked for where edges have zones"
         rows = [
             (
                 "profile",
@@ -416,11 +419,7 @@ class EquilibriumPath(ByValue, ResultViews):
             ("sticking", sticking_text(*energies, self.largest_contact_fraction)),
             ("range", self.range_summary()),
             ("audit", self._audit_text()),
-            (
-                "error",
-                f"{self.loss_error:.2g} J/m² (numerical); {counted(self.races, 'jump')} raced, "
-                f"{self.energy_at_stake:.3g} J/m² at stake",
-            ),
+            ("error", f"{self.loss_error:.2g} J/m² (numerical); {raced}"),
             ("jumps", ", ".join(f"{n} {kind}" for kind, n in counts.most_common()) or "none"),
             *self._rows_of_end(),
             ("method", f"{self.method.name}, {measure}{self.seconds:.1f} s"),

@@ -139,6 +139,8 @@ def test_patches_open_from_inside_at_the_strength():
     unloading = loop.patches[loop.branch == "unloading"]
     assert (np.diff(unloading) > 0).any()
     assert loop.loss < 0.3 * shut.loss
+    assert "races are not looked for" in loop.summary()
+    assert " raced, " in shut.summary()
     assert loop.interior is None or loop.interior.tension < 1.01 * loop.problem.strength
     assert any("take the method 'zones'" in text for text in shut.range_warnings())
     assert loop.range_warnings() == []
