@@ -5,8 +5,8 @@
 Scenes of numbers FIRST to LAST - 1, up to 2200 nodes each: H from 0.2 to 1, n0 from 1 to 4, ratio
 from 5 to 30, h_rms = 1 µm, period 2 mm, E = 1 MPa, ν = 0; α of the longest wave from 0.1 to 0.8;
 range from 5 nm to 1 µm; at a separation, under a stiffness or a load. Printed are loss, stated
-error, both over those of the finer run, and numbers of jumps; at last how often the difference
-exceeds the sum of both errors. What it printed is kept in ``random_zones.txt``.
+error, both over those of the finer run, and numbers of jumps and races; at last how often the
+difference exceeds the sum of both errors. What it printed is kept in ``random_zones.txt``.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def loop_of(problem: Problem, turn: dict[str, Any], **numbers: Any) -> LoopResul
 
 def main(first: int, last: int) -> None:
     """Print a row for each scene."""
-    print("number nodes loss error over_fine error_of_fine jumps jumps_of_fine share_of_error s")
+    print("number nodes loss error over_fine error_of_fine jumps jumps_of_fine races of_error s")
     off: list[float] = []
     for number in range(first, last):
         problem, turn = scene(number)
@@ -79,7 +79,7 @@ def main(first: int, last: int) -> None:
         print(
             f"{number} {nodes} {coarse.loss:.5g} {coarse.loss_error:.2g} "
             f"{coarse.loss / fine.loss:.5f} {fine.loss_error / fine.loss:.1e} "
-            f"{len(coarse.jumps)} {len(fine.jumps)} {off[-1]:.2f} {seconds:.1f}",
+            f"{len(coarse.jumps)} {len(fine.jumps)} {coarse.races} {off[-1]:.2f} {seconds:.1f}",
             flush=True,
         )
     found = np.array(off)

@@ -401,8 +401,6 @@ class EquilibriumPath(ByValue, ResultViews):
         )
         energies = problem.full_contact_energy, problem.work_of_adhesion
         raced = f"{counted(self.races, 'jump')} raced, {self.energy_at_stake:.3g} J/m² at stake"
-        if math.isinf(self.narrowest_length):
-            raced = "races are not looked for where edges have zones"
         rows = [
             (
                 "profile",

@@ -1,11 +1,13 @@
 """Descent of a gap to the next minimum of its energy, at a prescribed separation or load.
 
-Newton's method with conjugate gradients, preconditioned by the compliance, on the nodes that are
-not in contact. Contact nodes are those with g = 0 that are pressed; one that is pulled by more than
-the strength opens, so that contact, zones and openings need no rule of their own. Where the
-curvature along a direction is not positive the state is no minimum, and the descent goes on along
-it. No step moves a node by more than half the range, or half of what it is beyond the range: the
-end of a zone does not leap over a minimum.
+The flow of least energy through a viscosity, V ġ = -∂U/∂g, by linearly implicit steps (V/Δt + H) Δg
+= -∂U/∂g on the nodes that are not in contact, by conjugate gradients. Where nothing runs, Δt is
+infinite: that is Newton's method. V is that of the interface, the same at all nodes, or that of the
+solid, K itself. Which minimum is reached does not depend on the steps: they are short where H is
+not positive, and none moves a node by more than half the range, or half of what it is beyond it.
+
+Contact nodes are those with g = 0 that are pressed; one that is pulled by more than the strength
+opens, so that contact, zones and openings need no rule of their own.
 
 With a stiffness k of what holds the solid the mean gap s is free, and ½k(s - x)² is added to U;
 under a load p̄ it is p̄ s.
@@ -14,7 +16,6 @@ under a load p̄ it is p̄ s.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,8 +33,10 @@ _ITERATIONS = 200  # of conjugate gradients in one step
 _LOOSE = 0.1  # of the residual, to which a correction is solved far from a minimum
 _RATE = 1e-6  # of its residual, to which the rate of a branch is solved
 _STALLED = 1e3  # times that: residual where the energy falls no more
-_MOST_STEPS = 20_000
-_SHORTEST = 1e-6  # share to which a step is shortened that does not lower the energy
+_MOST_STEPS = 200_000
+_SLOWER, _FASTER = 2.0, 0.3  # times the damping 1/Δt after a step uphill, or a short one
+_AIM = 0.7  # of the longest way: that of the next step
+_LEAST_DAMPING, _MOST_DAMPING = 0.01, 1e8  # of the stiffness of the longest wave
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,12 +98,12 @@ class Descent:
         self.balanced = max(_BALANCED * float(surface.strength.min()), rounding)
 
     def run(
-        self, gap: Array, x: float, falls: Callable[[Minimum], bool] | None = None
+        self, gap: Array, x: float, least: float = -math.inf, *, by_interface: bool = False
     ) -> Minimum | None:
         """Descend from a gap to the minimum at the prescribed value ``x``.
 
-        None if ``falls`` is true of a gap on the way. Under a tension that nothing carries the gap
-        is returned at which the solid falls off.
+        None if the potential falls below ``least`` on the way. Under a tension that nothing carries
+        the gap is returned at which the solid falls off.
 
         Raises
         ------
@@ -108,31 +111,44 @@ class Descent:
             If there is no minimum within the largest number of steps, or the energy falls no more.
         """
         here, forces = self._at(self._prescribe(np.maximum(gap, 0.0), x), x)
+        symbol, slowest = self.surface.stiffness, self.surface.stiffness[1]
+        viscosity = np.full_like(symbol, slowest) if by_interface else np.maximum(symbol, slowest)
+        damping = 0.0
         for _ in range(_MOST_STEPS):
-            if falls is not None and falls(here):
+            if here.potential < least:
                 return None
             if self.control.is_load and x > 0 and here.adhesion == 0:
                 return here
-            if float(np.abs(forces.residual).max()) < self.balanced:
+            worst = float(np.abs(forces.residual).max())
+            if worst < self.balanced:
                 return here
             self.steps += 1
-            way = self._correction(forces)
-            share = 1.0
-            while True:
-                later = self._prescribe(np.maximum(here.gap + share * way, 0.0), x)
+            share = min(_LOOSE, math.sqrt(worst / float(self.surface.strength.max())))
+            stiffness = symbol + damping * viscosity
+            way, length = self._solve(forces.residual, forces, share, 1.0, stiffness)
+            downhill = False
+            if length < math.inf:
+                way /= max(1.0, length)
+                later = self._prescribe(np.maximum(here.gap + way, 0.0), x)
                 after, forces_after = self._at(later, x)
-                if after.potential <= here.potential or share < _SHORTEST:
-                    break
-                share *= 0.5
-            if share < _SHORTEST:  # the energy is at its rounding
-                if float(np.abs(forces.residual).max()) < _STALLED * self.balanced:
+                downhill = after.potential < here.potential
+            if not downhill:
+                damping = max(1.0, _SLOWER * damping)
+                if damping < _MOST_DAMPING:
+                    continue
+                if worst < _STALLED * self.balanced:  # the energy is at its rounding
                     return here
                 break
             here, forces = after, forces_after
+            damping *= min(1.0, max(length / _AIM, _FASTER)) * (damping > _LEAST_DAMPING)
         raise PathError(
             f"the descent ends at no minimum, at a prescribed {x:g} (in m, under a load in Pa): "
             "give more nodes_per_wave, or take the method 'sharp'"
         )
+
+    def at(self, gap: Array, x: float) -> Minimum:
+        """Return a gap with its energies at the prescribed value ``x``."""
+        return self._at(self._prescribe(gap, x), x)[0]
 
     def _prescribe(self, gap: Array, x: float) -> Array:
         """Give a gap the prescribed mean, by stretching it."""
@@ -147,13 +163,11 @@ class Descent:
         gradient = restoring + tension
         free = gap > 0
         separation = float(gap.mean())
-        if not control.is_fixed:
-            held = control.stiffness * (separation - x)
-            p = -x if control.is_load else held
-            free |= gradient + p < -self.balanced
-        else:
+        p = -x if control.is_load else control.stiffness * (separation - x)
+        if control.is_fixed:
             p = -float(gradient[free].mean())
-            free |= gradient + p < -self.balanced  # contact that is pulled off
+        free |= gradient + p < -self.balanced  # contact that is pulled off
+        if control.is_fixed:
             p = -float(gradient[free].mean())
         elastic = 0.5 * product(lifted, restoring) / surface.n
         potential = control.potential(elastic + adhesion, separation, p, self.h_max, 1.0)
@@ -166,61 +180,55 @@ class Descent:
 
         To a millionth: of stiff solids the loss is a small difference of large works.
         """
-        control = self.control
+        control, stiffness = self.control, self.surface.stiffness
         _, forces = self._at(here.gap, here.prescribed)
         uniform = forces.free.astype(float)
         if control.is_fixed:
             start = uniform / uniform.mean()
-            out_of_balance = self._restrict(self._stiffen(start, forces), forces)
+            out_of_balance = self._restrict(self._stiffen(start, forces, stiffness), forces)
         else:
-            start = np.zeros(self.surface.n)
+            start = 0.0 * uniform
             out_of_balance = -uniform * (1.0 if control.is_load else control.stiffness)
-        way, _ = self._solve(out_of_balance, start, forces, _RATE, math.inf)
+        way, _ = self._solve(out_of_balance, forces, _RATE, math.inf, stiffness)
+        way += start
         if control.is_fixed:
-            return way, -float(self._stiffen(way, forces)[forces.free].mean())
+            return way, -float(self._stiffen(way, forces, stiffness)[forces.free].mean())
         moved = float(way.mean())
         return way, moved if control.is_load else control.stiffness * (moved - 1.0)
 
-    def _correction(self, forces: _Forces) -> Array:
-        """Solve for the motion that balances the forces, or that leads downhill."""
-        worst = float(np.abs(forces.residual).max()) / float(self.surface.strength.max())
-        start = np.zeros(self.surface.n)
-        share = min(_LOOSE, float(np.sqrt(worst)))
-        way, downhill = self._solve(forces.residual, start, forces, share, 4.0)
-        if downhill is not None:
-            way += downhill / forces.reach(downhill)
-        return way / max(1.0, forces.reach(way))
-
     def _solve(
-        self, residual: Array, start: Array, forces: _Forces, share: float, longest: float
-    ) -> tuple[Array, Array | None]:
-        """Balance a residual to a share of it, by a motion from ``start`` on.
+        self, residual: Array, forces: _Forces, share: float, longest: float, stiffness: Array
+    ) -> tuple[Array, float]:
+        """Balance a residual to a share of it by a motion.
 
-        Also returns a direction of no positive curvature, if there is one on the way. The motion
-        ends where it is ``longest`` times as long as it may be.
+        Also returns how long the motion is, over what it may be: it ends where it is longer than
+        ``longest``, and is infinite where a direction has no positive curvature.
         """
         surface = self.surface
-        way, residual = start.copy(), residual.copy()
+        way, residual = np.zeros(surface.n), residual.copy()
+        compliance = 1 / np.maximum(stiffness, surface.stiffness[1])
         enough = share * math.sqrt(product(residual, residual))
-        fall = self._restrict(surface.filter(surface.compliance, residual), forces)
+        fall = self._restrict(surface.filter(compliance, residual), forces)
         direction, force = -fall, product(residual, fall)
+        length = 0.0
         for _ in range(_ITERATIONS):
-            change = self._restrict(self._stiffen(direction, forces), forces)
+            change = self._restrict(self._stiffen(direction, forces, stiffness), forces)
             curvature = product(direction, change)
             if curvature <= 0:
-                return way, direction
+                return way, math.inf
             way += (force / curvature) * direction
             residual += (force / curvature) * change
-            if product(residual, residual) <= enough**2 or forces.reach(way) > longest:
+            length = forces.reach(way)
+            if product(residual, residual) <= enough**2 or length > longest:
                 break
-            fall = self._restrict(surface.filter(surface.compliance, residual), forces)
+            fall = self._restrict(surface.filter(compliance, residual), forces)
             before, force = force, product(residual, fall)
             direction = (force / before) * direction - fall
-        return way, None
+        return way, length
 
-    def _stiffen(self, motion: Array, forces: _Forces) -> Array:
+    def _stiffen(self, motion: Array, forces: _Forces, stiffness: Array) -> Array:
         """Compute by how much a motion changes the forces at all nodes, in Pa."""
-        change = self.surface.filter(self.surface.stiffness, motion)
+        change = self.surface.filter(stiffness, motion)
         forces.ends.force_by(motion, change)
         if not (self.control.is_fixed or self.control.is_load):
             change += self.control.stiffness * motion.mean()

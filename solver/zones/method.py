@@ -161,9 +161,4 @@ class ZonesMethod(Method):
         gap = state.internal
         if not isinstance(gap, np.ndarray) or gap.shape != (self.nodes,):
             raise ValueError("this state was not made by this method zones")
-        period = self.problem.profile.period
-        return Minimum(
-            gap, self.problem.prescribed_in(state), state.separation, state.mean_stress,
-            state.elastic_energy / period, state.adhesion_energy / period,
-            state.potential / period,
-        )  # fmt: skip
+        return self.descent.at(gap, self.problem.prescribed_in(state))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +23,7 @@ _BENT = 0.2  # of what ΔY Δx is off the slopes: counts as a loss of a step
 _LOCATED = 0.3  # of the accuracy times the drop, or of the noise: work within which a jump lies
 _LONGEST = 0.05  # of the range: jumps hide in longer steps
 _NEAREST = 1e-9  # of the range: shortest step
+_MOVED = 0.1  # of the range of adhesion: gaps of two minima differ by more
 _WIDEST_EDGE = 0.99  # nodes between an edge and the next free node, at most
 
 
@@ -91,7 +93,7 @@ class Steps:
                     least = min(0.5 * abs(step), max(wanted, _NEAREST * self.scale))
                     step *= 0.5
                     continue
-                self._jump(here, after, (slope, slope_after), lost)
+                self._jump(here, after, (slope, slope_after), lost, here.gap + rate * step)
                 self.error += 0.0 if lost else within
                 if lost:
                     return
@@ -119,46 +121,42 @@ class Steps:
         """Descend at ``target``; None if the step has to be divided."""
         step = target - here.prescribed
         bent = 0.5 * slope * step**2
-        least = here.potential - self._conjugate(here) * step - bent
-        least -= 2 * abs(bent) + 2 * self.unit
+        least = here.potential - self._conjugate(here) * step - bent - 2 * (abs(bent) + self.unit)
+        return self.descent.run(here.gap + step * rate, target, least if divisible else -math.inf)
 
-        def falls(now: Minimum) -> bool:
-            return now.potential < least
+    def _at_stake(self, start: Array, after: Minimum) -> float | None:
+        """Energy in J/m² by which a jump ends elsewhere with a viscous interface, or None.
 
-        guess = here.gap + step * rate
-        return self.descent.run(guess, target, falls if divisible else None)
+        Where it ends near its start the fold is too near to be passed. Under a load no order of
+        events decides.
+        """
+        if self.problem.control.is_load:
+            return None
+        other = self.descent.run(start, after.prescribed, by_interface=True)
+        if other is None:
+            return None
+        apart = min(np.abs(other.gap - gap).max() for gap in (start, after.gap))
+        moved = apart > _MOVED * self.surface.range
+        return abs(other.potential - after.potential) if moved else None
 
-    def _jump(self, here: Minimum, after: Minimum, slopes: tuple[float, float], lost: bool) -> None:
+    def _jump(
+        self, here: Minimum, after: Minimum, slopes: tuple[float, float], lost: bool, start: Array
+    ) -> None:
         """Append a jump that lies between two minima, at the prescribed value of the second."""
-        control, h_max = self.problem.control, self.problem.profile.h_max
-        step = after.prescribed - here.prescribed
-        work = self._conjugate(here) * step
-        separation, p = here.separation, here.mean_stress
-        if control.is_load:
-            p = -after.prescribed
-        elif control.is_fixed:
-            separation = after.prescribed
-        else:
-            separation += step
-        held = control.potential(0.0, separation, p, h_max, 1.0)
-        fall = here.elastic + here.adhesion - (here.potential - work - held)
-        before = self.state_of(
-            Minimum(
-                here.gap, after.prescribed, separation, p, here.elastic - fall, here.adhesion,
-                here.potential - work,
-            ),
-            slopes[0],
-        )  # fmt: skip
-        end = self.state_of(after, slopes[1])
+        x = after.prescribed
+        apart = here.adhesion == 0
+        start_of_jump = replace(here, prescribed=x) if apart else self.descent.at(here.gap, x)
+        before, end = self.state_of(start_of_jump, slopes[0]), self.state_of(after, slopes[1])
         if lost:
-            end = ContactState.detached(separation)
-        opens = _opens(here.gap, after.gap)
+            end = ContactState.detached(before.separation)
         self.states += [before, end]
         if not before.contact_fraction:
             before = replace(before, edges=np.empty((0, 2)))
+        at_stake = self._at_stake(start, after)
         jump = Jump.between(
-            before, end, self.branch, self.surface.period, opens=opens, falls_off=lost
-        )
+            before, end, self.branch, self.surface.period, raced=at_stake is not None,
+            at_stake=at_stake or 0.0, opens=_opens(here.gap, after.gap), falls_off=lost,
+        )  # fmt: skip
         self.jumps.append(jump)
 
     def state_of(self, here: Minimum, slope: float) -> ContactState:
@@ -168,7 +166,7 @@ class Steps:
         """
         surface, control = self.surface, self.problem.control
         if here.adhesion == 0:
-            return ContactState.detached(here.separation)
+            return ContactState.detached(here.separation if control.is_load else here.prescribed)
         contact = here.gap == 0
         first, width = patch_ranges(contact)
         left, right = _beyond(here.gap, first, -1), _beyond(here.gap, first + width - 1, 1)
@@ -205,7 +203,5 @@ def _beyond(gap: Array, node: NDArray[np.intp], way: int) -> Array:
 
 def _opens(before: Array, after: Array) -> bool:
     """Whether a gap appears inside a patch: one all of whose nodes, and both beside, touched."""
-    first, width = patch_ranges(after > 0)
-    opened = np.concatenate([[0], np.cumsum(np.tile(before > 0, 3))])
-    n = len(before)
-    return bool(np.any(opened[n + first + width + 1] == opened[n + first - 1]))
+    gaps = zip(*patch_ranges(after > 0), strict=True)
+    return any(not before.take(range(k - 1, k + m + 1), mode="wrap").any() for k, m in gaps)

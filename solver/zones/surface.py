@@ -82,11 +82,10 @@ class Surface:
             self.height += _ASYMMETRY * profile.h_max * np.sin(phase)
         at: Array = self.dx * (np.arange(n, dtype=np.float64) + 0.5)
         self.strength = problem.toughness(at, profile.at(at, derivative=1)) / self.range
-        wave_number = 2 * np.pi / self.period * np.arange(n // 2 + 1)
-        self.stiffness = 0.5 * problem.half_space.modulus * wave_number
+        wave_number: Array = 2 * np.pi / self.period * np.arange(n // 2 + 1, dtype=np.float64)
+        self.stiffness: Array = 0.5 * problem.half_space.modulus * wave_number
         self.sharpness: Array = (7 - np.cos(wave_number * self.dx)) / 6  # of v - Δx² v''/12
         self.held_back = _HELD * self.dx / problem.half_space.modulus
-        self.compliance = 1 / np.maximum(self.stiffness, self.stiffness[1])
         self._values = pyfftw.zeros_aligned(n, dtype=np.float64)
         self._waves = pyfftw.zeros_aligned(n // 2 + 1, dtype=np.complex128)
         options = {"flags": ("FFTW_ESTIMATE",), "threads": 1}
