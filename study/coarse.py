@@ -58,7 +58,8 @@ class CoarsePath:
     def step(self, contact: Contact, penetration: float) -> Contact:
         """Move a relaxed contact to another Δ~ at once, and relax it there."""
         separation = (1 - penetration) * self.problem.profile.h_max
-        moved = contact.at(separation, self.problem.control)
+        moved = contact.copy()
+        moved.prescribed = moved.separation = separation
         if not moved.mask.any() and not self.relaxation.nucleate(moved):
             return moved
         self.solver.solve(moved, self.relaxation.tight)
