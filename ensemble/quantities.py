@@ -280,39 +280,29 @@ def with_units(table: Any, is_load: bool = False) -> Any:
     return table
 
 
-def shown_unit(name: str, largest: float) -> tuple[str, float]:
+def common_unit(name: str, values: Sequence[float]) -> tuple[str, float]:
     """Return a unit for a quantity of :data:`UNITS`, and that in the SI unit; ("", 1) for a number.
 
-    It is the one in which the largest value was written, or one of its size.
+    It is the one in which one of the values was written, or one of the size of the largest.
     """
     unit = UNITS.get(name, "")
     quantity = QUANTITIES.get(unit)
-    if quantity is None or math.isinf(largest):
+    by = next((value for value in values if isinstance(value, Written)), max(values))
+    if quantity is None or math.isinf(by):
         return unit, 1.0
-    unit = quantity.unit_for(largest)
+    unit = quantity.unit_for(by)
     return unit, quantity.units[unit]
 
 
-def with_unit(name: str, value: float) -> str:
-    """Return a value and its unit: "20 kPa"; a number alone where there is none."""
-    unit, size = shown_unit(name, value)
-    return f"{value / size:g} {unit}".rstrip()
-
-
-def common_unit(name: str, values: Sequence[float]) -> tuple[str, float]:
-    """Return :func:`shown_unit` of several values: as one was written, or of the largest."""
-    return shown_unit(name, next((v for v in values if isinstance(v, Written)), max(values)))
-
-
 def in_one_unit(name: str, values: Sequence[float], between: str = ", ") -> str:
-    """Return values, ascending, in their common unit: "0.2, 0.4 kPa"."""
+    """Return values, ascending, in their common unit, if they have one: "0.2, 0.4 kPa"."""
     unit, size = common_unit(name, values)
     return f"{between.join(f'{value / size:g}' for value in sorted(values))} {unit}".rstrip()
 
 
 def gamma_text(work_of_adhesion: float) -> str:
     """Return a work of adhesion γ and its unit: "0.02 J/m²", or "20 mJ/m²" if written so."""
-    return with_unit("work_of_adhesion", work_of_adhesion)
+    return in_one_unit("work_of_adhesion", [work_of_adhesion])
 
 
 # Not listed: settings of a method, which its documentation describes, and loops with the keys of

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.errors import InputError, parameter
-from adhesis.ensemble.quantities import gamma_text, with_unit
+from adhesis.ensemble.quantities import gamma_text, in_one_unit
 
 
 def place(others: Iterable[tuple[str, float]]) -> str:
     """Return "max_stress = 20 kPa, ratio = 8"; empty without further axes."""
-    return ", ".join(f"{name} = {with_unit(name, value)}" for name, value in others)
+    return ", ".join(f"{name} = {in_one_unit(name, [value])}" for name, value in others)
 
 
 def name_at(hurst: float, work_of_adhesion: float, others: Sequence[tuple[str, float]]) -> str:

@@ -14,7 +14,7 @@ from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.cells import Cell, alike, difference, doubtful_loops, precisions
 from adhesis.ensemble.campaign.tables import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
-from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit
+from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.further_axes import (
     failed_cells,
@@ -393,7 +393,7 @@ def _along(data: Aggregate, axis: Axis) -> Iterator[str]:
             short.append(name_at(line[0].hurst, line[0].work_of_adhesion, alike))
         else:
             steps.append(np.diff([cell.estimates["loss"].mean for cell in line]))
-    low, high = (with_unit(axis.name, end) for end in (min(axis.values), max(axis.values)))
+    low, high = (in_one_unit(axis.name, [end]) for end in (min(axis.values), max(axis.values)))
     along = f"Along {axis.name} from {low} to {high}"
     if not steps:
         yield (

@@ -15,9 +15,9 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from adhesis._version import __version__
 from adhesis.ensemble.escape import code_span, markdown, markdown_table, printable
 from adhesis.ensemble.quantities import (
+    common_unit,
     length_text,
     rounded_percent,
-    shown_unit,
     stress_text,
     with_error,
 )
@@ -286,10 +286,10 @@ def _trace(answer: Answer) -> tuple[Figure, str]:
     heights = prepared.trace.heights
     level, profile = prepared.level(), prepared.profile()
     x = prepared.start + prepared.step * np.arange(level.size)
-    unit_x, in_x = shown_unit("length", prepared.trace.length)
+    unit_x, in_x = common_unit("length", [prepared.trace.length])
     figure = style.new_figure(2, 1, style.TWO_COLUMNS, 3.3, sharex=True)
     above, below = figure.axes
-    unit_z, in_z = shown_unit("height_range", prepared.trace.height_range)
+    unit_z, in_z = common_unit("height_range", [prepared.trace.height_range])
     measured = prepared.step * np.arange(heights.size)
     above.plot(measured / in_x, heights / in_z, color=_GREY, lw=0.7)
     fit = prepared.filled - level
@@ -302,7 +302,7 @@ def _trace(answer: Answer) -> tuple[Figure, str]:
     marked = _mark(figure.axes, in_x, prepared)
     above.set(ylabel=f"measured ({unit_z})")
     above.legend(loc="best")
-    unit_z, in_z = shown_unit("height_range", float(np.ptp(level)))
+    unit_z, in_z = common_unit("height_range", [float(np.ptp(level))])
     below.plot(x / in_x, level / in_z, color=_GREY, lw=0.7, label="level")
     n = max(4 * profile.highest_harmonic, 2000) + 1
     used = profile.heights(n)
@@ -421,7 +421,7 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
     gammas, turns = answer.works_of_adhesion, answer.turning_points
     turning_point = cycle.turning.symbol
     if cycle.turning.has_unit:
-        unit, size = shown_unit("preload", cycle.turning_points[0])
+        unit, size = common_unit("preload", cycle.turning_points[:1])
         turns = [(turn / size, row) for turn, row in turns]
         turning_point = f"{turning_point} ({unit})"
     if len(gammas) + len(turns) < 4:
