@@ -83,17 +83,12 @@ def list_of_names() -> Rule:
     """Lists of two or more names each; read as a tuple of sorted tuples."""
 
     def read(value: object) -> tuple[tuple[str, ...], ...]:
-        if not isinstance(value, list):
+        groups = lists.read(value)
+        names = [name for group in groups for name in group]
+        if any(len(group) < 2 for group in groups) or len(set(names)) < len(names):
             raise ValueError
-        groups = []
-        for names in value:
-            if not isinstance(names, list) or len(names) < 2:
-                raise ValueError
-            if not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
-                raise ValueError
-            groups.append(tuple(sorted(names)))
-        if len({name for group in groups for name in group}) < sum(map(len, groups)):
-            raise ValueError
-        return tuple(sorted(groups))
+        return tuple(sorted(tuple(sorted(group)) for group in groups))
 
+    name = Rule("a name", lambda value: checks.instance("", value, str, ""))
+    lists = list_of(list_of(name), may_be_empty=True)
     return Rule('a list of groups of keys, as [["hurst", "m2"]], no key twice', read)
