@@ -33,11 +33,6 @@ from adhesis.solver.values import finite
 _SIGNS = {"hurst": "H", "work_of_adhesion": "γ"}
 
 
-def key_columns(data: Aggregate) -> list[TableColumn]:
-    """Return the columns of the cell that a row is about: H, γ, and every further axis."""
-    return [axis_column(axis) for axis in data.campaign.axes]
-
-
 def axis_column(axis: Axis, cell: str = "", suffix: str = "", heading: str = "") -> TableColumn:
     """Return the column of an axis, for people in the unit of the campaign.
 
@@ -104,7 +99,7 @@ def losses(data: Aggregate) -> Table:
     """One row for each cell, everything that ``losses.csv`` holds."""
     cycle, material = data.campaign.cycle, data.campaign.material
     columns = [
-        *key_columns(data),
+        *map(axis_column, data.campaign.axes),
         TableColumn("n", "done", "n"),
         TableColumn("failed", "failed", "failed", only_if_any=True),
         TableColumn("pending", "pending", "pending", only_if_any=True),
@@ -160,7 +155,13 @@ def losses(data: Aggregate) -> Table:
         columns += estimated("zone_error", "mean", "± zones", number(1, 1e-3), **_MILLI, note=zones)
     columns += [
         TableColumn(
-            *("loss_over_work_of_adhesion", _over_gamma, "W/γ", number(3)),
+            "loss_over_work_of_adhesion",
+            lambda cell: (
+                cell.estimates["loss"].mean / cell.work_of_adhesion
+                if cell.work_of_adhesion
+                else None
+            ),
+            *("W/γ", number(3)),
             only_if_any=True,
             note="W/γ: loss over work of adhesion",
         ),
@@ -264,18 +265,12 @@ def _papers_m2(cell: Cell) -> float | None:
     return paper.m2(cell.hurst) if paper.is_cell_of(cell) else None
 
 
-def _over_gamma(cell: Cell) -> float | None:
-    """Return the mean loss over the work of adhesion; None without adhesion."""
-    gamma = cell.work_of_adhesion
-    return cell.estimates["loss"].mean / gamma if gamma > 0 else None
-
-
 def precision(data: Aggregate) -> Table:
     """Tabulate the precision of the quantity of ``[stop]``; no rows without ``[stop]``."""
     verdict = {True: "yes", False: "no", None: "not finished"}
     three_digits = partial(percent, digits=3)
     columns = [
-        *key_columns(data),
+        *map(axis_column, data.campaign.axes),
         TableColumn("n", "precision.estimate.n", "n"),
         TableColumn("quantity", "precision.quantity", "quantity"),
         TableColumn("mean", "precision.estimate.mean", "mean", number()),
@@ -296,7 +291,7 @@ def precision(data: Aggregate) -> Table:
 def beside_the_paper(data: Aggregate) -> Table:
     """The paper's Table 1, cell by cell; no rows for others than the paper's."""
     columns = [
-        *key_columns(data),
+        *map(axis_column, data.campaign.axes),
         TableColumn("n", "done", "n"),
         *estimated("loss_dimensionless", "value ci_low ci_high", "W~"),
         TableColumn("paper", paper.table_1, "paper", fixed(2)),
@@ -387,7 +382,7 @@ def companions(data: Aggregate) -> Table:
             lambda row: "; ".join(row["companion"].differs) or "nothing",
             "where it differs",
         ),
-        *key_columns(data),
+        *map(axis_column, data.campaign.axes),
         TableColumn("pairs", "loss.difference.n", "pairs"),
         TableColumn("loss_dimensionless_here", "loss.here.mean", "W~ here", number()),
         TableColumn("loss_dimensionless_there", "loss.there.mean", "there", number()),
@@ -407,7 +402,7 @@ def companions(data: Aggregate) -> Table:
 def works(data: Aggregate) -> Table:
     """What approach gains and separation spends: docs/theory.md, section 8."""
     columns = [
-        *key_columns(data),
+        *map(axis_column, data.campaign.axes),
         TableColumn("n", "done", "n"),
         *estimated("work_gained", "mean", "gained on approach (mJ/m²)", **_MILLI),
         *estimated("work_spent", "mean", "spent on separation (mJ/m²)", **_MILLI),
@@ -446,7 +441,7 @@ def jumps(data: Aggregate) -> Table:
         for k in np.flatnonzero(cell.jumps.number).tolist()
     ]
     columns = [
-        *key_columns(data),
+        *map(axis_column, data.campaign.axes),
         TableColumn("kind", "kind", "kind"),
         TableColumn("scale", "scale", "scale"),
         TableColumn("jumps_per_loop", "number", "jumps a loop", number(3)),
@@ -464,7 +459,7 @@ def shares_by_kind(data: Aggregate) -> Table:
     kinds = [(k, JUMP_KINDS[k]) for k in found]
     columns = [TableColumn(kind, partial(_share, k), kind, percent) for k, kind in kinds]
     title = "Share of the drops by kind of the jump"
-    return make_table(title, [*key_columns(data), *columns], data.cells)
+    return make_table(title, [*map(axis_column, data.campaign.axes), *columns], data.cells)
 
 
 def mechanisms(data: Aggregate) -> Table:
@@ -474,7 +469,7 @@ def mechanisms(data: Aggregate) -> Table:
     penetration.
     """
     columns = [
-        *key_columns(data),
+        *map(axis_column, data.campaign.axes),
         *estimated("small_scale_share", "value ci_low ci_high", "small-scale share", percent),
         *estimated("jump_count", "value", "jumps a loop", number(3)),
         *estimated("pull_off_stress", "value", "largest tension (kPa)", number(3, unit=1e3)),
@@ -491,7 +486,7 @@ def mechanisms(data: Aggregate) -> Table:
 def slopes(data: Aggregate, branches: Sequence[str] = BRANCHES) -> Table:
     """Exponent of the deformed surface's spectrum at small wave numbers, state by state."""
     columns = [
-        *key_columns(data),
+        *map(axis_column, data.campaign.axes),
         TableColumn("branch", "branch", "branch"),
         TableColumn("penetration", "penetration", state_sign(data), fixed(2)),
         TableColumn("realisations", "realisations", "n"),

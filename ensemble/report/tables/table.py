@@ -78,7 +78,8 @@ class Table:
             writer = csv.writer(file, lineterminator="\n")
             kept = [bool(column.name) for column in self.columns]
             writer.writerow([column.name for column in self.columns if column.name])
-            writer.writerows(map(_exact, compress(row, kept)) for row in self.rows)
+            known = ([None if _missing(value) else value for value in row] for row in self.rows)
+            writer.writerows(compress(row, kept) for row in known)
 
     def markdown(self) -> str:
         """Return the columns that have a heading as a Markdown table."""
@@ -125,9 +126,3 @@ def make_table(title: str, columns: Sequence[TableColumn], of: Iterable[Any]) ->
 
 def _missing(value: Value) -> bool:
     return value is None or (isinstance(value, float) and math.isnan(value))
-
-
-def _exact(value: Value) -> str:
-    if _missing(value):
-        return ""
-    return repr(value) if isinstance(value, float) else str(value)
