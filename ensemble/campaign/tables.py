@@ -444,34 +444,24 @@ class Campaign:
         return np.flatnonzero(branches.ravel() % part.of == part.number - 1)
 
     @cached_property
-    def loading_penetration(self) -> Array:
-        """Δ/h_max of the loading curve, ascending, shape (load_steps + 1,).
+    def penetration(self) -> dict[Branch, Array]:
+        """Δ/h_max of the stored curves: loading ascending, unloading descending by the same step.
 
-        With several ``max_penetration`` the curves' axes are in units of it; under a load they
+        The loading curve has shape (load_steps + 1,). With several ``max_penetration`` both are in
+        units of it, and that of unloading is as long as the smallest one needs; under a load they
         reach 1, whatever the turning point.
-        """
-        steps = self.cycle.load_steps
-        return self._top * np.arange(steps + 1) / steps
-
-    @cached_property
-    def unloading_penetration(self) -> Array:
-        """Δ/h_max of the stored unloading curve, descending from Δ~max with the same step.
-
-        With several ``max_penetration`` in units of it, and as long as the smallest one needs.
         """
         steps, smallest = self.cycle.load_steps, self.cycle.deepest
         last = math.ceil(self.cycle.unloading_until / smallest * steps - 1e-9)
-        return self._top * np.arange(steps, last - 1, -1) / steps
-
-    @property
-    def _top(self) -> float:
-        return 1.0 if self.has_axis("max_penetration") else self.cycle.deepest
+        top = 1.0 if self.has_axis("max_penetration") else smallest
+        places = {"loading": np.arange(steps + 1), "unloading": np.arange(steps, last - 1, -1)}
+        return {branch: top * places[branch] / steps for branch in BRANCHES}
 
     def curve_axes(self, task: Task) -> dict[Branch, Array]:
         """Return Δ/h_max of the curves of a task, which share the axes of the results file."""
         several = self.has_axis("max_penetration")
         unit = self.at(task).cycle.turning_point if several else 1.0
-        return {branch: unit * getattr(self, f"{branch}_penetration") for branch in BRANCHES}
+        return {branch: unit * axis for branch, axis in self.penetration.items()}
 
     def value(self, key: str) -> Any:
         """Return the value in the tables of a key ("cycle.load_steps")."""

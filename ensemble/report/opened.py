@@ -290,9 +290,8 @@ class CampaignResults(AbstractContextManager["CampaignResults"]):
                 dims = [_RENAMED.get(dim, dim) for dim in d.dims[1:]]
                 found[d.name] = (("task", *dims), values, d.described)
                 for dim, name in zip(d.dims[1:], dims, strict=True):
-                    scale = known[dim]
-                    label = list(BRANCHES) if name == "branch" else scale.values
-                    found[name] = (name, label, {"units": scale.unit, "long_name": scale.meaning})
+                    label = list(BRANCHES) if name == "branch" else known[dim].numbers
+                    found[name] = (name, label, known[dim].described)
         fills = {d.name: d.fill for d in datasets}
         spread = found.set_index(task=list(self.axes)).unstack("task", fill_value=fills)
         return spread.transpose(*self.axes, ...).assign_attrs(source=printable(self.path.name))
@@ -336,9 +335,9 @@ def curves_dataset(data: Aggregate) -> xr.Dataset:
     out["quantile"] = ("quantile", list(QUANTILES), _about("1", text))
     done = np.array([cell.done for cell in data.cells], np.int32)
     out["realisations"] = ("cell", done, _about("1", "realisations that were averaged"))
-    for branch in BRANCHES:
+    for branch, places in campaign.penetration.items():
         along = f"{branch}_penetration"
-        out[along] = (along, getattr(campaign, along), _about("1", f"{depth} on {branch}"))
+        out[along] = (along, places, _about("1", f"{depth} on {branch}"))
         for name, (unit, text) in _CURVES.items():
             base = f"{branch}_{name}"
             for part, (what, *further) in _PARTS.items():

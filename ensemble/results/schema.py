@@ -23,9 +23,8 @@ from adhesis.ensemble.task.dataset import (
     FLOAT,
     KEPT,
     Dataset,
-    Scale,
     flags,
-    row_shape,
+    scale,
     sizes_of,
 )
 from adhesis.ensemble.task.row import RESULT_DATASETS, row_scales
@@ -91,19 +90,19 @@ def kept_rows(campaign: Campaign, part: Part = WHOLE) -> NDArray[np.intp]:
     return np.flatnonzero(realisation < campaign.output.field_realisations)
 
 
-def scales(campaign: Campaign, part: Part = WHOLE) -> tuple[Scale, ...]:
+def scales(campaign: Campaign, part: Part = WHOLE) -> tuple[Dataset, ...]:
     """Return the dimensions of the results file of a campaign, or of a part of it."""
     return (
-        Scale("task", campaign.rows(part), "1", "row of the task in the whole campaign"),
+        scale("task", campaign.rows(part), "1", "row of the task in the whole campaign"),
         *row_scales(campaign),
-        Scale(KEPT, kept_rows(campaign, part), "1", "row of a task that keeps its fields"),
+        scale(KEPT, kept_rows(campaign, part), "1", "row of a task that keeps its fields"),
     )
 
 
 def check_same_rows(one: Campaign, two: Campaign, refused: str) -> None:
     """Raise InputError if rows of two campaigns differ in dimensions; ``refused`` names what is."""
     pairs = zip(row_scales(one), row_scales(two), strict=True)
-    if not all(a.name == b.name and np.array_equal(a.values, b.values) for a, b in pairs):
+    if not all(a.name == b.name and np.array_equal(a.numbers, b.numbers) for a, b in pairs):
         raise InputError(
             f"{refused}: the bins of its spectra would change (they follow the highest n0 · ratio "
             "of the campaign, and the period)"
@@ -113,7 +112,7 @@ def check_same_rows(one: Campaign, two: Campaign, refused: str) -> None:
 class Member(NamedTuple):
     """A scale or dataset in the file of one campaign, as it is laid out and as readers want it."""
 
-    dataset: Dataset  # without dimensions of a scale
+    dataset: Dataset
     shape: tuple[int, ...]
     # Returns the numbers that the campaign decides; None where a run writes them
     values: Callable[[], NDArray[Any]] | None
@@ -128,16 +127,14 @@ def members(campaign: Campaign, part: Part = WHOLE) -> list[Member]:
     """Return the scales and then the datasets of the file of a campaign, or of a part of it."""
     laid_out, tasks = scales(campaign, part), campaign.tasks(part)
     sizes, further = sizes_of(laid_out), axis_datasets(campaign)
-    known = {d.name: partial(tasks.column, d.name) for d in TASK_DATASETS}
+    known = {d.name: partial(np.asarray, d.numbers) for d in laid_out}
+    known |= {d.name: partial(tasks.column, d.name) for d in TASK_DATASETS}
     for dataset, axis in zip(further, tasks.names, strict=True):
         known[dataset.name] = partial(tasks.column, axis)
-    found = []
-    for s in laid_out:
-        scale = Dataset(s.name, s.unit, s.meaning, s.values.dtype.str, ())
-        found.append(Member(scale, s.values.shape, partial(np.asarray, s.values)))
-    for d in (*TASK_DATASETS, *further, *RUN_DATASETS, *RESULT_DATASETS):
-        found.append(Member(d, (sizes[d.dims[0]], *row_shape(d, sizes)), known.get(d.name)))
-    return found
+    return [
+        Member(d, tuple(sizes[dim] for dim in d.dims or (d.name,)), known.get(d.name))
+        for d in (*laid_out, *TASK_DATASETS, *further, *RUN_DATASETS, *RESULT_DATASETS)
+    ]
 
 
 def file_size(campaign: Campaign, part: Part = WHOLE) -> int:

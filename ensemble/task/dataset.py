@@ -18,7 +18,7 @@ KEPT = "field_task"
 
 @dataclass(frozen=True)
 class Dataset:
-    """One dataset, a row for each task."""
+    """One dataset, a row for each task; or one dimension of such datasets (:func:`scale`)."""
 
     name: str
     unit: str  # as UDUNITS reads it; "1" if there is none
@@ -28,6 +28,7 @@ class Dataset:
     attributes: Mapping[str, Any] = field(default_factory=dict)  # further attributes
     # How its row is taken from a loop (:mod:`adhesis.ensemble.task.row`); None where it is not
     value: Callable[..., Any] | None = field(default=None, compare=False)
+    numbers: Any = field(default=None, compare=False)  # of a dimension, which has none itself
 
     @property
     def fill(self) -> Any:
@@ -41,19 +42,14 @@ class Dataset:
         return {"units": self.unit, "long_name": self.meaning, **self.attributes}
 
 
-@dataclass(frozen=True)
-class Scale:
-    """One dimension: its values, with unit and meaning."""
-
-    name: str
-    values: NDArray[Any]
-    unit: str
-    meaning: str
+def scale(name: str, numbers: NDArray[Any], unit: str, meaning: str) -> Dataset:
+    """Return one dimension: its numbers, with unit and meaning."""
+    return Dataset(name, unit, meaning, numbers.dtype.str, (), numbers=numbers)
 
 
-def sizes_of(scales: Iterable[Scale]) -> dict[str, int]:
+def sizes_of(scales: Iterable[Dataset]) -> dict[str, int]:
     """Return the length of each dimension."""
-    return {scale.name: scale.values.size for scale in scales}
+    return {scale.name: scale.numbers.size for scale in scales}
 
 
 def row_shape(dataset: Dataset, sizes: Mapping[str, int]) -> tuple[int, ...]:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
-from adhesis.ensemble.task.dataset import FIELD, KEPT, Dataset, Scale, row_shape, sizes_of
+from adhesis.ensemble.task.dataset import FIELD, KEPT, Dataset, row_shape, scale, sizes_of
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.method import BRANCHES, ContactState, Method
 from adhesis.solver.model.profile import Array
@@ -97,25 +97,25 @@ class FieldPlan:
         return np.asarray(total / np.diff(edges))
 
 
-def field_scales(plan: FieldPlan) -> tuple[Scale, ...]:
+def field_scales(plan: FieldPlan) -> tuple[Dataset, ...]:
     """Return the dimensions of the datasets of fields, lengths in units of keys with a list."""
     campaign = plan.campaign
     if campaign.has_axis("period"):
-        waves = Scale("wave_number", plan.wave_number, "1", "wave number/q0, middle of its bin")
-        positions = Scale("field_position", plan.position, "1", "q0 times the position of a node")
+        waves = scale("wave_number", plan.wave_number, "1", "wave number/q0, middle of its bin")
+        positions = scale("field_position", plan.position, "1", "q0 times the position of a node")
     else:
-        waves = Scale("wave_number", plan.wave_number, "rad m-1", "wave number, middle of its bin")
+        waves = scale("wave_number", plan.wave_number, "rad m-1", "wave number, middle of its bin")
         meaning = "position of a node of a kept field"
-        positions = Scale("field_position", plan.position, "m", meaning)
+        positions = scale("field_position", plan.position, "m", meaning)
     depth = f"penetration/{'max_penetration' if campaign.has_axis('max_penetration') else 'h_max'}"
     if campaign.cycle.turns_at_stress:
         depth = f"mean stress/{'max_stress' if campaign.cycle.under_load else 'preload'}"
     return (
         waves,
-        Scale("gap_bin", GAP_BINS, "1", "gap/h_max, geometric middle of its bin"),
-        Scale("height_bin", HEIGHT_BINS, "1", "height/h_rms, middle of its bin"),
-        Scale("field_branch", np.arange(2), "1", "branch of a field: 0 loading, 1 unloading"),
-        Scale("field_penetration", plan.penetration, "1", f"{depth} of a field"),
+        scale("gap_bin", GAP_BINS, "1", "gap/h_max, geometric middle of its bin"),
+        scale("height_bin", HEIGHT_BINS, "1", "height/h_rms, middle of its bin"),
+        scale("field_branch", np.arange(2), "1", "branch of a field: 0 loading, 1 unloading"),
+        scale("field_penetration", plan.penetration, "1", f"{depth} of a field"),
         positions,
     )
 

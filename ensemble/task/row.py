@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.task.dataset import COUNT, FLAG, FLOAT, Dataset, Scale, flags, row_shape
+from adhesis.ensemble.task.dataset import COUNT, FLAG, FLOAT, Dataset, flags, row_shape, scale
 from adhesis.ensemble.task.fields import FIELD_DATASETS, FieldPlan, field_scales
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.model.jump import BRANCHES, JUMP_KINDS, Branch
@@ -146,14 +146,14 @@ _CURVES = tuple(chain(*CURVES.values()))
 RESULT_DATASETS = (*TIMES, *NUMBERS, *_CURVES, JUMP_COUNT, *JUMPS, *FIELD_DATASETS)
 
 
-def row_scales(campaign: Campaign) -> tuple[Scale, ...]:
+def row_scales(campaign: Campaign) -> tuple[Dataset, ...]:
     """Return the dimensions of the rows of a campaign."""
     several = campaign.has_axis("max_penetration")
     depth = f"penetration/{'max_penetration' if several else 'h_max'}"
-    curves = [(f"{branch}_penetration", branch) for branch in BRANCHES]
+    curves = campaign.penetration.items()
     return (
-        *(Scale(name, getattr(campaign, name), "1", f"{depth} on {b}") for name, b in curves),
-        Scale("jump", np.arange(campaign.output.jumps), "1", "place in the catalogue of jumps"),
+        *(scale(f"{b}_penetration", axis, "1", f"{depth} on {b}") for b, axis in curves),
+        scale("jump", np.arange(campaign.output.jumps), "1", "place in the catalogue of jumps"),
         *field_scales(FieldPlan(campaign)),
     )
 

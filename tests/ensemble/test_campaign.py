@@ -51,8 +51,8 @@ def test_values_units_and_defaults():
     assert campaign.solver.time_limit is None
     assert campaign.profile.normalisation == {"h_rms": 1e-6}
     assert campaign.task_count == 8
-    np.testing.assert_array_equal(campaign.loading_penetration, 0.6 * np.arange(5) / 4)
-    axis = campaign.unloading_penetration
+    np.testing.assert_array_equal(campaign.penetration["loading"], 0.6 * np.arange(5) / 4)
+    axis = campaign.penetration["unloading"]
     assert axis[0] == 0.6
     assert axis[-1] == pytest.approx(-3)
     np.testing.assert_allclose(np.diff(axis), -0.15)
@@ -377,7 +377,7 @@ def test_a_path_turns_where_its_control_lets_it_turn():
     assert load.cycle.turning_point == 100
     first = load.tasks()[0]
     assert [load.at(task).cycle.turning_point for task in load.sharing(first)] == [100, 300]
-    assert load.unloading_penetration[0] == 1.0
+    assert load.penetration["unloading"][0] == 1.0
     assert load.curve_axes(first)["loading"][-1] == 1.0
 
 

@@ -208,7 +208,7 @@ def test_a_campaign_of_preloads_from_end_to_end(tmp_path, capsys):
         loop = run_loop(method, preload=preload, max_penetration=0.95, load_steps=10)
         assert row["loss"] == pytest.approx(loop.loss, rel=1e-4)
         assert row["turning_penetration"] == pytest.approx(loop.max_penetration, rel=1e-7)
-        beyond = campaign.loading_penetration > loop.max_penetration
+        beyond = campaign.penetration["loading"] > loop.max_penetration
         assert np.isnan(row["loading_mean_stress"][beyond]).all()
         assert row["loading_mean_stress"][~beyond].max() <= preload * (1 + 1e-9)
         gap = row["field_gap"].mean(axis=-1)[:, -1]
@@ -269,7 +269,7 @@ def test_a_machine_of_a_campaign_may_go_beyond_the_height_of_its_profile():
     stress = row["loading_mean_stress"]
     beyond = row["turning_penetration"] + 400 / (1e8 * row["h_max"])
     assert beyond > 1
-    known = campaign.loading_penetration <= beyond
+    known = campaign.penetration["loading"] <= beyond
     assert np.isfinite(stress[known]).all()
     assert np.isnan(stress[~known]).all()
     assert np.isfinite(row["field_gap"]).all()

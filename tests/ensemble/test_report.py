@@ -204,11 +204,11 @@ def test_loops_are_drawn_with_one_standard_deviation(data, drawn):
     axes = figure.axes[2]
     cell = data.finished([0.8], [0.01])[0]
     line = lines_of(axes)[r"$\gamma$ = 0.01 J/m², loading"]
-    np.testing.assert_array_equal(line[:, 0], data.campaign.loading_penetration)
+    np.testing.assert_array_equal(line[:, 0], data.campaign.penetration["loading"])
     np.testing.assert_array_equal(line[:, 1], cell.curves["loading_mean_stress_dimensionless"].mean)
     band = axes.patches[0].get_path().vertices
     half = cell.curves["loading_mean_stress_dimensionless"].std[-1]
-    top = band[band[:, 0] == data.campaign.loading_penetration[-1], 1]
+    top = band[band[:, 0] == data.campaign.penetration["loading"][-1], 1]
     assert np.ptp(top) == pytest.approx(2 * half)
     assert axes.get_xlabel().startswith("penetration")
     assert "sigma" in axes.get_ylabel()

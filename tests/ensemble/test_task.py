@@ -57,8 +57,8 @@ def test_curves_end_in_zeros_after_detachment():
     loop = loop_of(campaign)
     row = loop_row(campaign, loop)
     for branch, axis in (
-        ("loading", campaign.loading_penetration),
-        ("unloading", campaign.unloading_penetration),
+        ("loading", campaign.penetration["loading"]),
+        ("unloading", campaign.penetration["unloading"]),
     ):
         stress, reached = row[f"{branch}_mean_stress"], loop.states(branch, load_steps_only=True)
         assert stress.shape == axis.shape
@@ -94,7 +94,7 @@ def test_the_range_of_adhesion_is_in_the_row():
 def test_curves_are_cut_where_the_axis_ends():
     campaign = parse_campaign(campaign_text(unloading_until="-0.1"))
     row = loop_row(campaign, loop_of(campaign))
-    assert row["unloading_patches"].shape == campaign.unloading_penetration.shape
+    assert row["unloading_patches"].shape == campaign.penetration["unloading"].shape
     assert row["unloading_patches"].all()
 
 
@@ -212,9 +212,9 @@ def test_a_loop_under_a_load_is_that_of_the_library_on_axes_of_penetration():
     assert row["loss"] == loop.loss
     sizes = sizes_of(row_scales(campaign))
     assert all(np.shape(row[d.name]) == row_shape(d, sizes) for d in RESULT_DATASETS)
-    assert campaign.loading_penetration[-1] == 1.0
+    assert campaign.penetration["loading"][-1] == 1.0
     stress = row["loading_mean_stress"]
-    beyond = campaign.loading_penetration > loop.max_penetration
+    beyond = campaign.penetration["loading"] > loop.max_penetration
     assert beyond.any()
     assert not beyond.all()
     np.testing.assert_array_equal(np.isnan(stress), beyond)
