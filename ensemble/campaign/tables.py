@@ -433,7 +433,7 @@ class Campaign:
         Tasks that share a loading branch go to the same part.
         """
         if part == WHOLE or self._turning is None:
-            return part.rows(self.task_count)
+            return np.arange(part.number - 1, self.task_count, part.of)
         branches = np.arange(self.task_count).reshape(-1, self.realisations)
         first: dict[tuple[float, ...], int] = {}
         turn = [axis.name for axis in self.axes].index(self._turning.name)

@@ -92,10 +92,6 @@ class Tasks:
         seed = task_seed(self.seed, realisation)
         return Task(hurst, gamma, realisation, seed, tuple(zip(self.names, others, strict=True)))
 
-    def chosen(self, rows: NDArray[np.int64]) -> Tasks:
-        """Return the tasks with these numbers in the whole campaign."""
-        return replace(self, rows=rows)
-
     def cell_of(self) -> NDArray[np.int64]:
         """Return the number of each task's cell."""
         return self.rows // self.realisations
@@ -118,7 +114,7 @@ class Tasks:
 
     def of_cells(self) -> Tasks:
         """Return the first task of each cell."""
-        return self.chosen(self.rows[np.diff(self.cell_of(), prepend=-1) != 0])
+        return replace(self, rows=self.rows[np.diff(self.cell_of(), prepend=-1) != 0])
 
 
 @dataclass(frozen=True)
@@ -135,10 +131,6 @@ class Part:
         if match and 1 <= int(match[1]) <= int(match[2]):
             return cls(int(match[1]), int(match[2]))
         raise InputError(f"{parameter('part')} is {text!r}: it must be K/N with 1 ≤ K ≤ N, as 3/20")
-
-    def rows(self, count: int) -> NDArray[np.int64]:
-        """Rows of the whole campaign, of ``count`` tasks, that belong to the part, ascending."""
-        return np.arange(self.number - 1, count, self.of)
 
     def __str__(self) -> str:
         return f"{self.number}/{self.of}"

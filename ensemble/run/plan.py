@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Literal
@@ -174,7 +174,7 @@ def prepare(
         status[again] = schema.PENDING
         plan = _plan(results, status)
     # where nothing is left, the solver is not loaded
-    for task in plan.tasks.chosen(plan.tasks.rows[plan.rows]).of_cells():
+    for task in replace(plan.tasks, rows=plan.tasks.rows[plan.rows]).of_cells():
         check_cell(task)
     if again or plan.batches is not None:
         with Writer(path) as writer:

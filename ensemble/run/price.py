@@ -6,7 +6,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Hashable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from itertools import groupby
 from operator import attrgetter
@@ -160,7 +160,7 @@ def price(
     # Of the cells that are not known yet, realisation by realisation
     unknown = np.array([not known.get(cell) for cell in left.cells])
     rows = left.rows[unknown[left.cell_of()]]
-    to_try = left.chosen(rows[np.argsort(rows % left.realisations, kind="stable")])
+    to_try = replace(left, rows=rows[np.argsort(rows % left.realisations, kind="stable")])
     pilots, spent, end, longest = 0, 0.0, time.monotonic() + seconds, 0.0
     short: list[float] = []
     for unit in _units(campaign, to_try):
@@ -212,9 +212,9 @@ def _left(campaign: Campaign, path: Path, tasks: Tasks, known: Known) -> tuple[T
         seconds, values = (results.column(name)[done].tolist() for name in quantities)
         more = (NOT_NEEDED,) if campaign.stop != results.campaign.stop else ()
         left[rows[~np.isin(status, (PENDING, DAMAGED, *more))]] = False
-    for task, took, value in zip(tasks.chosen(rows[done]), seconds, values, strict=True):
+    for task, took, value in zip(replace(tasks, rows=rows[done]), seconds, values, strict=True):
         known[task.cell].append((took, value))
-    return tasks.chosen(np.flatnonzero(left)), int(done.sum())
+    return replace(tasks, rows=np.flatnonzero(left)), int(done.sum())
 
 
 def _units(campaign: Campaign, tasks: Tasks) -> Iterator[list[Task]]:

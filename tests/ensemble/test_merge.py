@@ -32,7 +32,7 @@ def computed(path, part="1/1", text=CAMPAIGN, skip=(), fail=()):
     create(path, campaign, part=share)
     with Writer(path) as writer:
         for row, task in enumerate(campaign.tasks(share)):
-            whole = int(share.rows(campaign.task_count)[row])
+            whole = int(campaign.rows(share)[row])
             if whole in fail:
                 writer.write_failure(row, "ValueError: no", 1.0)
             elif whole not in skip:
