@@ -26,10 +26,8 @@ from adhesis.ensemble.run.interrupt import NEVER
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.versions import versions
 from adhesis.solver.checks import counted
+from adhesis.solver.model.profile import Array
 
-Group = tuple[float, ...]
-"""Cell of the tasks that take about the same time: of those that share a loading branch, without
-their turning point."""
 _MOST_SHOWN = 10
 # Bytes of a file that some disks take more than ten seconds for.
 _LONG_TO_LAY_OUT = 10**9
@@ -91,8 +89,7 @@ class Plan:
     done: int  # rows that are
     failed: int
     known: NDArray[np.int64]  # checksum of each row that is done or failed; -1 of others
-    # Of each group of tasks that take about the same time: seconds measured, and tasks
-    times: dict[Group, tuple[float, int]] = field(default_factory=dict)
+    seconds: Array  # wall time of each row that is done, NaN of others
     batches: Batches | None = None  # where the campaign has ``[stop]``: what comes after ``rows``
 
 
@@ -216,14 +213,7 @@ def _growth(path: Path, old: Results, campaign: Campaign, part: Part) -> tuple[s
 
 def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
     campaign, tasks = results.campaign, results.tasks()
-    times: dict[Group, tuple[float, int]] = {}
-    seconds = results.column("wall_time")
-    for task, of_cell in tasks.by_cell():
-        measured = seconds[of_cell[status[of_cell] == schema.DONE]]
-        if measured.size:
-            group = group_of(campaign, task)
-            before, count = times.get(group, (0.0, 0))
-            times[group] = (before + float(measured.sum()), count + measured.size)
+    seconds = np.where(status == schema.DONE, results.column("wall_time"), np.nan)
     rows, batches = np.flatnonzero(status == schema.PENDING).tolist(), None
     is_known = np.isin(status, (schema.DONE, schema.FAILED))
     if campaign.stop.relative_error is not None:
@@ -232,12 +222,7 @@ def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
         rows = batches.to_do
     done, failed = (int(np.sum(status == code)) for code in (schema.DONE, schema.FAILED))
     known = np.where(is_known, results.column(schema.CHECKSUM.name).astype(np.int64), -1)
-    return Plan(tasks, rows, done, failed, known, times, batches)
-
-
-def group_of(campaign: Campaign, task: Task) -> Group:
-    """Return the group of a task; those of one group and realisation share a loading branch."""
-    return campaign.branch_of(task).cell
+    return Plan(tasks, rows, done, failed, known, seconds, batches)
 
 
 def prior(task: Task) -> float:

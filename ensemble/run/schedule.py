@@ -66,14 +66,13 @@ class Schedule:
             self._ordered.discard(turn)
             self._count(unit, 1)
 
-    def measured(self, group: Hashable, seconds: float, count: int = 1) -> None:
-        """Take in that ``count`` tasks of a group took ``seconds`` altogether."""
-        entry = self._groups.get(group)
-        if entry is not None:
-            entry.seconds += seconds
-            entry.count += count
-            self._known_seconds += seconds
-            self._known_prior += entry.prior * count
+    def measured(self, group: Hashable, seconds: float) -> None:
+        """Take in that a task of a group took so many seconds."""
+        entry = self._groups[group]
+        entry.seconds += seconds
+        entry.count += 1
+        self._known_seconds += seconds
+        self._known_prior += entry.prior
 
     def mean(self, group: Hashable) -> float | None:
         """Return the mean measured time of a task of a group in s; None if none was measured."""

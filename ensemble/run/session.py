@@ -28,7 +28,7 @@ from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import dispatch
 from adhesis.ensemble.run.interrupt import StopSignals
 from adhesis.ensemble.run.lock import RunLock
-from adhesis.ensemble.run.plan import Group, Options, Plan, group_of, prepare, prior
+from adhesis.ensemble.run.plan import Options, Plan, prepare, prior
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, together
 from adhesis.ensemble.run.schedule import Schedule
@@ -311,16 +311,19 @@ class _Session:
             schedule.add(further)
 
     def _schedule(self) -> Schedule:
-        groups: list[Group] = []  # of each task
+        # Of each task the cell without its turning point, if its loading branch is shared: such
+        # tasks take about the same time.
+        groups: list[tuple[float, ...]] = []
         priors: dict[Hashable, float] = {}
         for task, rows in self.plan.tasks.by_cell():
-            group = group_of(self.campaign, task)
+            group = self.campaign.branch_of(task).cell
             groups += [group] * rows.size
             priors[group] = prior(task)
         rounds = self.plan.tasks.column("realisation").tolist()
         schedule = Schedule(self.plan.rows, groups, priors, rounds)
-        for group, (seconds, count) in self.plan.times.items():
-            schedule.measured(group, seconds, count)
+        for group, seconds in zip(groups, self.plan.seconds.tolist(), strict=True):
+            if not math.isnan(seconds):
+                schedule.measured(group, seconds)
         return schedule
 
     def _stop(self) -> str | None:

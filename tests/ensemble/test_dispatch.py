@@ -166,7 +166,8 @@ def test_times_of_an_earlier_run_count_as_often_as_they_were_measured():
     groups = {0: "short", 1: "long"}
     schedule = Schedule([0, 1], groups, {"short": 1.0, "long": 3.0}, {0: 0, 1: 0})
     assert schedule.seconds_left((), 1) is None
-    schedule.measured("short", 40.0, 4)
+    for _ in range(4):
+        schedule.measured("short", 10.0)
     assert schedule.estimate("long") == 30.0
     assert schedule.seconds_left((), 1) == 40.0
     schedule.measured("short", 10.0)

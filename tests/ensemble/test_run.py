@@ -445,7 +445,7 @@ def test_the_deadline_of_the_batch_system():
 
 def test_workers_have_as_long_to_answer_as_the_walltime_leaves_by_any_clock(tmp_path, monkeypatch):
     campaign = load_campaign(write_campaign(tmp_path))
-    plan = Plan(campaign.tasks(), [0], 0, 0, np.full(8, -1))
+    plan = Plan(campaign.tasks(), [0], 0, 0, np.full(8, -1), np.full(8, np.nan))
 
     def session_of(options):
         return session._Session(campaign, plan, None, options, StopSignals(), Engine())
