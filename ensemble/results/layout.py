@@ -116,9 +116,16 @@ def create(
 
 
 def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
+    """Create the datasets, contiguous, their places on disk taken and filled at once."""
     made: dict[str, h5py.Dataset] = {}
     for column, shape, values in schema.members(campaign, part):
-        dataset = made[column.name] = _allocate(file, column, shape)
+        plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+        # texts are filled with zeros; h5py hands a text over as garbage
+        fill = None if column.dtype.startswith("S") else column.fill
+        dataset = made[column.name] = file.create_dataset(
+            *(column.name, shape, column.dtype), fillvalue=fill, fill_time="alloc", dcpl=plist
+        )
         if not column.dims:
             dataset.make_scale(column.name)
         dataset.attrs.update(column.described)
@@ -126,17 +133,6 @@ def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
             dataset.dims[axis].attach_scale(made[dim])
         if values is not None:
             dataset[...] = values()
-
-
-def _allocate(file: h5py.File, column: Dataset, shape: tuple[int, ...]) -> h5py.Dataset:
-    """Create a contiguous dataset, its place on disk taken and filled at once."""
-    plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-    # texts are filled with zeros; h5py hands a text over as garbage
-    fill = None if column.dtype.startswith("S") else column.fill
-    return file.create_dataset(
-        *(column.name, shape, column.dtype), fillvalue=fill, fill_time="alloc", dcpl=plist
-    )
 
 
 # ---------------------------------------------------------------------- rows of other files
