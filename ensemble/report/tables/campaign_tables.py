@@ -98,6 +98,7 @@ _FROM_ZERO = ("loss_dimensionless", "loss")  # of which no end of an interval be
 def losses(data: Aggregate) -> Table:
     """One row for each cell, everything that ``losses.csv`` holds."""
     cycle, material = data.campaign.cycle, data.campaign.material
+    least = f"the least of {ANY_RANGE} of all loops"
     columns = [
         *map(axis_column, data.campaign.axes),
         TableColumn("n", "done", "n"),
@@ -191,7 +192,9 @@ def losses(data: Aggregate) -> Table:
             lambda cell: extreme(np.min, cell.least_range) if cell.work_of_adhesion else None,
             *("range (nm)", number(unit=1e-9)),
             only_if_any=True,
-            note=_note_on_ranges(material.opens),
+            note=f"range: {least}, to be set beside the range of adhesion that is given"
+            if material.opens
+            else f"range: range of adhesion below which the zero-range limit holds ({least})",
         ),
         *(TableColumn(f"{name}_least [m]", _of_loops(name, np.min)) for name in RANGES),
         TableColumn("largest_interior_tension [Pa]", _of_loops("largest_interior_tension", np.max)),
@@ -228,14 +231,6 @@ def _note(data: Aggregate) -> str:
         f"h_max; s.e.: standard error of the mean{interval if methods else ''}"
         f"{weight if data.campaign.cycle.under_load else ''}"
     )
-
-
-def _note_on_ranges(is_given: bool) -> str:
-    """Return what the column of ranges is; ``is_given``: beside a range of adhesion, or without."""
-    least = f"the least of {ANY_RANGE} of all loops"
-    if is_given:
-        return f"range: {least}, to be set beside the range of adhesion that is given"
-    return f"range: range of adhesion below which the zero-range limit holds ({least})"
 
 
 def _note_on_load_steps(data: Aggregate) -> str:
