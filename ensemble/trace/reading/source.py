@@ -139,8 +139,9 @@ class Source:
     def container(self) -> str | None:
         """Return a message for a workbook or an archive that is no instrument's file, else None."""
         begin, suffix = self.beginning(), Path(self.name).suffix.lower()
+        workbook = f"{self} is a workbook: save its columns as text (CSV)"
         if begin.startswith(_COMPOUND) and (suffix in _WORKBOOKS or _BOOK in self.read()):
-            return _of_workbook(self)
+            return workbook
         if not begin.startswith(_ZIP):
             return None
         try:
@@ -149,17 +150,13 @@ class Source:
         except (OSError, zipfile.BadZipFile):
             names = []
         if suffix in _WORKBOOKS or any(re.match(r"xl/|content\.xml", n) for n in names):
-            return _of_workbook(self)
+            return workbook
         if names and all(name.endswith(".npy") for name in names):
             return f"{self} is an archive of arrays: save the one of the heights as .npy"
         # Instruments write archives, too.
         if suffix == ".zip" or (names and all(n.endswith((".csv", ".txt")) for n in names)):
             return f"{self} is an archive (zip): unpack it first (unzip {shlex.quote(str(self))})"
         return None
-
-
-def _of_workbook(source: Source) -> str:
-    return f"{source} is a workbook: save its columns as text (CSV)"
 
 
 def source_of(given: Any) -> Source:
