@@ -23,6 +23,7 @@ from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.run import launch
 from adhesis.ensemble.versions import LAST, gist, installed, processor
 
+Reports = list[dict[str, Any]]
 _RANKS = 2
 _TIME_LIMIT = 60.0  # s; the first load of the libraries from a cold network disk is slow
 
@@ -57,12 +58,12 @@ class Diagnosis:
 
 def examine(directory: Path | str | None = None) -> Diagnosis:
     """Run all checks; ranks write a file in ``directory``, or where temporary files are."""
-    alone = _run_probe([], directory)
-    found = alone.reports[0] if alone.reports else {}
+    reports, failure = _run_probe([], directory)
+    found = reports[0] if reports else {}
     texts = found.get("versions") or installed()
-    checks = [_libraries(alone, texts), _kernels()]
+    checks = [_libraries(reports, failure, texts), _kernels()]
     mpirun = launch.launcher()
-    together: _Probe | None = None
+    together = None
     if not found.get("mpi_loads"):
         checks.append(Check("MPI library", False, texts["mpi"], needed=False))
     elif mpirun is None:
@@ -70,7 +71,7 @@ def examine(directory: Path | str | None = None) -> Diagnosis:
         checks.append(Check("ranks", False, text, needed=False))
     else:
         together = _run_probe([mpirun, "-n", str(_RANKS)], directory)
-        checks.append(_ranks(together, mpirun))
+        checks.append(_ranks(*together, mpirun))
 
     writer = "rank 0"
     if not found.get("parallel_hdf5"):
@@ -78,7 +79,7 @@ def examine(directory: Path | str | None = None) -> Diagnosis:
     elif together is None:
         why = "no ranks could be started"
     else:
-        written = _writing(together)
+        written = _writing(*together)
         checks.append(written)
         why = written.text
         if written.ok:
@@ -87,15 +88,8 @@ def examine(directory: Path | str | None = None) -> Diagnosis:
     return Diagnosis(writer, why, launch.cores(), mpirun or "", version, texts, checks)
 
 
-@dataclass(frozen=True)
-class _Probe:
-    """Reports of the processes of one probe, and the end of their command."""
-
-    reports: list[dict[str, Any]]
-    failure: str  # empty if the command ended well
-
-
-def _run_probe(start: list[str], directory: Path | str | None) -> _Probe:
+def _run_probe(start: list[str], directory: Path | str | None) -> tuple[Reports, str]:
+    """Return the reports of the processes of one probe, and how their command failed, if it did."""
     try:
         if start:
             launch.check_file_size_limit()
@@ -110,9 +104,9 @@ def _run_probe(start: list[str], directory: Path | str | None) -> _Probe:
             for path in sorted(Path(scratch).glob("report-*.json")):
                 with suppress(OSError, ValueError):  # the process ended while it wrote
                     reports.append(json.loads(path.read_text()))
-            return _Probe(reports, failure)
+            return reports, failure
     except (OSError, WriteError) as error:
-        return _Probe([], f"cannot be started: {error}")
+        return [], f"cannot be started: {error}"
 
 
 def _run(command: list[str]) -> tuple[int | None, str]:
@@ -142,9 +136,9 @@ def _run(command: list[str]) -> tuple[int | None, str]:
     return process.returncode, output
 
 
-def _libraries(probe: _Probe, texts: Mapping[str, str]) -> Check:
-    if not probe.reports:
-        return Check("libraries", False, f"a process that loads them {probe.failure}")
+def _libraries(reports: Reports, failure: str, texts: Mapping[str, str]) -> Check:
+    if not reports:
+        return Check("libraries", False, f"a process that loads them {failure}")
     named = ((name, texts[name]) for name in ("hdf5", "fftw"))
     broken = [f"{name}: {text}" for name, text in named if not text[:1].isdigit()]
     return Check("libraries", not broken, "; ".join(broken) or "HDF5 and FFTW load")
@@ -158,30 +152,30 @@ def _kernels() -> Check:
     return Check("kernels", True, f"{_kernels.COMPILER}, on {processor()}")
 
 
-def _ranks(probe: _Probe, mpirun: str) -> Check:
-    sizes = [report["size"] for report in probe.reports if "size" in report]
+def _ranks(reports: Reports, failure: str, mpirun: str) -> Check:
+    sizes = [report["size"] for report in reports if "size" in report]
     if sizes == [_RANKS] * _RANKS:
         return Check("ranks", True, f"mpirun -n {_RANKS} gives {_RANKS} ranks that see each other")
     if len(sizes) == _RANKS and set(sizes) == {1}:
-        library = probe.reports[0]["versions"]["mpi"]
+        library = reports[0]["versions"]["mpi"]
         text = (
             f"{mpirun} -n {_RANKS} gives {_RANKS} processes that do not see each other: it belongs "
             f"to another MPI than mpi4py's ({library}); set MPIRUN to that one's"
         )
     else:
-        text = f"{mpirun} -n {_RANKS} {probe.failure or f'gave {len(sizes)} ranks'}"
+        text = f"{mpirun} -n {_RANKS} {failure or f'gave {len(sizes)} ranks'}"
         if given := ", ".join(launch.settings()):
             text += f"; settings of MPI: {given}"
     return Check("ranks", False, text)
 
 
-def _writing(probe: _Probe) -> Check:
+def _writing(reports: Reports, failure: str) -> Check:
     name = "mpio writing available"
-    outcomes = [report.get("mpio", "not tried") for report in probe.reports]
+    outcomes = [report.get("mpio", "not tried") for report in reports]
     if outcomes == ["ok"] * _RANKS:
         return Check(name, True, f"yes: {_RANKS} ranks wrote one file together, and it read back")
     reasons = sorted({text for text in outcomes if text != "ok"})
-    return Check(name, False, "no: " + ("; ".join(reasons) or probe.failure or "no rank answered"))
+    return Check(name, False, "no: " + ("; ".join(reasons) or failure or "no rank answered"))
 
 
 def _mpirun_version(mpirun: str) -> str:

@@ -42,9 +42,9 @@ def test_the_environment_of_a_process_names_this_package_and_no_working_director
 
 
 def test_doctor_and_workers_execute_nothing_of_the_working_directory(study):
-    (probe,) = [examine._run_probe([], study)]
-    assert probe.failure == ""
-    assert len(probe.reports) == 1
+    reports, failure = examine._run_probe([], study)
+    assert failure == ""
+    assert len(reports) == 1
     (answer,) = Loops([IMPOSSIBLE], 1).run().values()
     assert str(answer).startswith("ValueError")  # from the solver, so that was found
 
