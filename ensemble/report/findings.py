@@ -20,9 +20,9 @@ from adhesis.ensemble.report.further_axes import (
     failed_cells,
     from_to,
     lines_along,
-    own_axes,
     state_sign,
     together,
+    with_figure,
 )
 from adhesis.ensemble.report.tables.campaign_tables import extreme, inside_interval, off_the_paper
 from adhesis.ensemble.results.read import Results
@@ -220,7 +220,7 @@ def agreement(data: Aggregate) -> Iterator[str]:
     if of_paper:
         yield from _table_1(shown)
     yield from _growth(data, of_paper)
-    for axis in own_axes(data):
+    for axis in with_figure(data):
         yield from _along(data, axis)
     yield from _order_in_slope(shown, of_paper)
     yield from _unloading_exceeds_loading(data, of_paper)

@@ -74,12 +74,6 @@ def together(data: Aggregate, axis: Axis) -> set[str]:
     return next((set(names) for names in groups if axis.name in names), {axis.name})
 
 
-def own_axes(data: Aggregate) -> list[Axis]:
-    """Further axes but those that vary together with H or γ."""
-    of_figures = {"hurst", "work_of_adhesion"}
-    return [axis for axis in data.further if not together(data, axis) & of_figures]
-
-
 def lines_along(data: Aggregate, axis: Axis) -> list[list[AveragedCell]]:
     """Finished cells that differ along one axis (and those that go with it) alone, ascending."""
     lines = alike((cell for cell in data.cells if cell.done), together(data, axis))
@@ -88,7 +82,7 @@ def lines_along(data: Aggregate, axis: Axis) -> list[list[AveragedCell]]:
 
 def with_figure(data: Aggregate) -> list[Axis]:
     """Further axes that have a figure: all but those that vary together with H or γ."""
-    axes = own_axes(data)
+    axes = (a for a in data.further if not together(data, a) & {"hurst", "work_of_adhesion"})
     return [axis for axis in axes if any(len(line) > 1 for line in lines_along(data, axis))]
 
 
