@@ -76,7 +76,7 @@ def _loops(name: str, results: Results) -> list[list[str]]:
     column["work_of_adhesion"] = results.column("work_of_adhesion")
     for dataset in axis_datasets(results.campaign):
         column[dataset.name] = results.column(dataset.name)
-    tasks = results.tasks()
+    tasks = results.tasks
     curves = {
         key: results.column(key)
         for branch in BRANCHES
@@ -124,7 +124,7 @@ def _losses_in_contact(
     results: Results, column: dict[str, Any], curves: dict[str, Any], chosen: list[int]
 ) -> dict[int, float]:
     """W~ without detached realisations, by row, of the chosen loops that are done."""
-    status, tasks = results.status(), results.tasks()
+    status, tasks = results.status(), results.tasks
     cells: dict[tuple[float, ...], list[int]] = {}
     for row in chosen:
         if status[row] == DONE:

@@ -196,7 +196,7 @@ def finished_cells(results: Results) -> list[Cell]:
 
 def read_cells(results: Results) -> list[Cell]:
     """Read every cell by H, γ, further axes, ascending."""
-    campaign, tasks, status = results.campaign, results.tasks(), results.status()
+    campaign, tasks, status = results.campaign, results.tasks, results.status()
     seed = tasks.column("seed")
     done = np.flatnonzero(status == DONE)
     columns = {name: results.column(name)[done].astype(float) for name in _PER_TASK}

@@ -54,7 +54,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
     unknown.
     """
     with Results(path) as results:
-        campaign, tasks, state = results.campaign, results.tasks(), results.status()
+        campaign, tasks, state = results.campaign, results.tasks, results.status()
         units = {axis.name: axis.unit for axis in campaign.axes[:2]}
         units |= {dataset.name: dataset.unit for dataset in axis_datasets(campaign)}
         cells = read_cells(results)

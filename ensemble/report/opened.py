@@ -299,7 +299,7 @@ class CampaignResults(AbstractContextManager["CampaignResults"]):
 
 def _axes(results: Results) -> dict[str, NDArray[Any]]:
     """Values of every task on each axis, row by row; of a part, those of its rows."""
-    tasks = results.tasks()
+    tasks = results.tasks
     names = ("hurst", "work_of_adhesion", *tasks.names, "realisation")
     return {name: tasks.column(name) for name in names}
 

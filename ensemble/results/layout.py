@@ -142,7 +142,7 @@ def rows_in(campaign: Campaign, file: Results) -> Rows:
     """Return the row in a whole campaign, from which the file's has grown, of each of its tasks."""
     cells = campaign.tasks().of_cells()
     place = {campaign.identity(task): number for number, task in enumerate(cells)}
-    tasks, here = file.tasks(), file.tasks().of_cells()
+    tasks, here = file.tasks, file.tasks.of_cells()
     there = np.zeros(len(tasks.cells), np.intp)
     there[here.cell_of()] = [place[file.campaign.identity(task)] for task in here]
     rows: Rows = there[tasks.cell_of()] * campaign.realisations + tasks.column("realisation")
@@ -287,5 +287,5 @@ def _compare(one: Source, other: Source, row: int) -> None:
         if mine.tobytes() != other.results.column(dataset.name, there).tobytes():
             raise InputError(
                 f"{one.results.path} and {other.results.path} both hold "
-                f"{one.results.tasks()[here.item()]}, and their {dataset.name} differs"
+                f"{one.results.tasks[here.item()]}, and their {dataset.name} differs"
             )

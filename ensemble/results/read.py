@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.file import parse_campaign
-from adhesis.ensemble.campaign.tasks import WHOLE, Part, Tasks
+from adhesis.ensemble.campaign.tasks import WHOLE, Part
 from adhesis.ensemble.errors import InputError, lack, quoted
 from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.results import schema
@@ -63,15 +63,21 @@ class Results(AbstractContextManager["Results"]):
             found = {d.name: self._file[d.name] for d in schema.DATASETS if d.name in self._file}
             self._check_size(found)
             self.attributes = self._root_attributes()
-            schema.check_version(
-                self.path, self.attributes.get("file_type"), self.attributes["file_version"]
-            )
+            version = np.ravel(self.attributes["file_version"])[:4].tolist()
+            if self.attributes.get("file_type") != schema.FILE_TYPE:
+                raise InputError(f"{self.path} is not a results file of adhesis")
+            if version != [schema.FILE_VERSION]:
+                raise InputError(
+                    f"{self.path} has file version {'.'.join(map(str, version))}, and this adhesis "
+                    f"reads version {schema.FILE_VERSION}: read it with the adhesis that wrote it, "
+                    "or compute the campaign again into another file"
+                )
             text = self.attributes["campaign"]
             self.campaign = parse_campaign(text, str(self.path), is_stored=True)
             self.part = self._part()
             self._check_attributes()
             self._check_members(found)
-            self._tasks = self.campaign.tasks(self.part)
+            self.tasks = self.campaign.tasks(self.part)  # row by row
             stack.pop_all()
 
     def _check_size(self, found: dict[str, h5py.Dataset]) -> None:
@@ -259,10 +265,6 @@ class Results(AbstractContextManager["Results"]):
             held[spare] = empty_checksums(self._file, schema.NOT_NEEDED, rows[spare])
         held[~spare] = row_checksums(self.column, self.column(KEPT), rows[~spare])
         return np.asarray((status > schema.NOT_NEEDED) | (written != held))
-
-    def tasks(self) -> Tasks:
-        """Return every task, row by row."""
-        return self._tasks
 
     def errors(self, rows: NDArray[np.intp]) -> list[str]:
         """Return the error texts of some rows (ascending)."""

@@ -168,15 +168,3 @@ def origin_of(versions: Mapping[str, Any]) -> str:
         by += f" ({commit[:12]})"
     others = (f"{name} {versions[name]}" for name in _COMPUTING if versions.get(name))
     return ", ".join((by, *others))
-
-
-def check_version(path: object, file_type: object, version: object) -> None:
-    """Refuse a file of another type, or of a version that this code does not know (InputError)."""
-    if file_type != FILE_TYPE:
-        raise InputError(f"{path} is not a results file of adhesis")
-    if not np.array_equal(np.asarray(version), FILE_VERSION):
-        shown = ".".join(str(n) for n in np.ravel(np.asarray(version))[:4].tolist())
-        raise InputError(
-            f"{path} has file version {shown}, and this adhesis reads version {FILE_VERSION}: read "
-            "it with the adhesis that wrote it, or compute the campaign again into another file"
-        )

@@ -165,7 +165,7 @@ def prepare(
         if again:
             say(f"{results.damage()}{_AGAIN}")
         if redo is not None:
-            chosen = redo.rows(results.tasks(), status)
+            chosen = redo.rows(results.tasks, status)
             say(f"{path}: {counted(len(chosen), 'task')} to be computed again")
             again += chosen
         status[again] = schema.PENDING
@@ -212,7 +212,7 @@ def _growth(path: Path, old: Results, campaign: Campaign, part: Part) -> tuple[s
 
 
 def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
-    campaign, tasks = results.campaign, results.tasks()
+    campaign, tasks = results.campaign, results.tasks
     seconds = np.where(status == schema.DONE, results.column("wall_time"), np.nan)
     rows, batches = np.flatnonzero(status == schema.PENDING).tolist(), None
     is_known = np.isin(status, (schema.DONE, schema.FAILED))

@@ -96,7 +96,7 @@ def test_what_failed_in_one_part_gives_way_to_what_was_done_in_another(tmp_path)
         assert (merged.done, merged.failed) == (10, 2)
         with Results(out) as results:
             assert results.status()[[3, 4, 5, 9]].tolist() == [DONE, FAILED, DONE, FAILED]
-            loss = fake_result(results.campaign, results.tasks()[3])["loss"]
+            loss = fake_result(results.campaign, results.tasks[3])["loss"]
             assert results.column("loss")[3] == loss
 
 
@@ -175,7 +175,7 @@ def test_a_part_is_what_it_is(tmp_path, capsys):
     run_file(path, out, part=Part(2, 3))
     with Results(out) as results:
         assert results.part == Part(2, 3)
-        assert list(results.tasks()) == list(results.campaign.tasks())[1::3]
+        assert list(results.tasks) == list(results.campaign.tasks())[1::3]
         assert results.column("task").tolist() == [1, 4, 7]
     more = tmp_path / "more.toml"
     more.write_text(campaign_text(realisations="3"))

@@ -185,7 +185,7 @@ def test_kills_at_random_moments(tmp_path, victim):
         done = set[str]()  # tasks as the fake task's log has them
         if out.exists():
             with Results(out) as results:
-                rows = zip(results.tasks(), results.status(), strict=True)
+                rows = zip(results.tasks, results.status(), strict=True)
                 found = (task for task, status in rows if status == DONE)
                 done = {f"{t.hurst}:{t.work_of_adhesion}:{t.realisation}" for t in found}
         log = tmp_path / f"log{killed}"

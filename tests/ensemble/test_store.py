@@ -69,7 +69,7 @@ def test_lists_that_an_earlier_run_took_are_read_with_its_results(list_, tmp_pat
 def test_a_new_file_is_whole_and_pending_with_units_names_and_scales(path, campaign):
     with Results(path) as results:
         assert results.campaign == campaign
-        assert list(results.tasks()) == list(campaign.tasks())
+        assert list(results.tasks) == list(campaign.tasks())
         assert not results.status().any()
         for column in RESULT_DATASETS:
             values = results.column(column.name)

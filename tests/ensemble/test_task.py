@@ -395,7 +395,7 @@ def test_only_first_realisations_keep_fields_through_redo_and_growth(tmp_path):
     with Results(path) as old:
         create(path, larger, sources=[Source(old, larger, old.status() == DONE)])
     with Results(path) as grown:
-        tasks = [grown.tasks()[row] for row in grown.column(KEPT)]
+        tasks = [grown.tasks[row] for row in grown.column(KEPT)]
         assert [task.realisation for task in tasks] == [0, 1] * 6
         for name in KEPT_COLUMNS:
             for task, values in zip(tasks, grown.column(name), strict=True):
