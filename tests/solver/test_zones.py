@@ -168,7 +168,7 @@ def trough_loop(method: str) -> LoopResult:
     theta = 2 * np.pi * np.arange(128) / 128
     profile = profile_from_heights(A * (np.cos(theta) + 0.3 * np.cos(5 * theta + 0.3)), PERIOD)
     problem = Problem(profile, SOLID, wave_of(0.15).work_of_adhesion, adhesion_range=0.05 * A)
-    return scenes.loop_of(problem, method, accuracy=1e-2, max_penetration=0.9, load_steps=20)
+    return scenes.loop_of(problem, method, accuracy=1e-2, max_penetration=0.9, load_steps=6)
 
 
 def test_patches_open_from_inside_at_the_strength():
