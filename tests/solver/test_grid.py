@@ -18,8 +18,8 @@ def rough_profile() -> Profile:
 
 
 def rough_loop(profile: Profile, gamma: float = 2e-3, young: float = 1e6) -> LoopResult:
-    method = grid_of(Problem(profile, HalfSpace(young, 0.5), gamma), nodes=512)
-    return run_loop(method, max_penetration=0.8, load_steps=12)
+    method = grid_of(Problem(profile, HalfSpace(young, 0.5), gamma), nodes=256)
+    return run_loop(method, max_penetration=0.8, load_steps=6)
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def test_loop_integral_is_the_sum_of_drops_and_mean_stress_the_slope_of_the_ener
 def test_shift_mirror_and_scale_change_nothing(loop):
     """By whole nodes; a part of a node is the error of the grid. Lengths × 4, heights × 2."""
     profile = rough_profile()
-    node = profile.period / 512
+    node = profile.period / 256
     whole, part = profile.shifted(37 * node).mirrored(), profile.shifted(0.37 * node)
     assert rough_loop(whole).loss == pytest.approx(loop.loss, rel=1e-5)
     assert rough_loop(part).loss == pytest.approx(loop.loss, rel=0.01)

@@ -210,7 +210,7 @@ def loop_in(
 ) -> LoopResult:
     problem = Problem(profile, SOFT, gamma, measure=measure)
     nodes_per_wave = 16 if method == "grid" else None
-    path = {"max_penetration": 0.7, "load_steps": 5}
+    path = {"max_penetration": 0.4, "load_steps": 2}
     return loop_of(problem, method, nodes_per_wave=nodes_per_wave, **path)
 
 

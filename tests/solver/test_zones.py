@@ -42,7 +42,7 @@ def wave_loop(alpha: float, share: float, **numbers: float) -> LoopResult:
 # by way of states in which they attract each other and do not touch.
 @pytest.mark.parametrize(
     ("alpha", "share"),
-    [(0.1, 0.05), (0.1, 0.1), (0.1, 0.2), (0.3, 0.1), (0.3, 0.2), (0.5, 0.2)],
+    [(0.1, 0.05), (0.1, 0.2), (0.3, 0.1), (0.3, 0.2), (0.5, 0.2)],
 )
 def test_a_wave_loses_what_dugdales_law_has_it_lose(alpha, share):
     wave, loop = wave_of(alpha), wave_loop(alpha, share)
@@ -208,9 +208,9 @@ def test_a_symmetric_profile_loses_what_a_hardly_asymmetric_one_does():
         heights = A * (np.cos(theta) + 0.06 * np.cos(8 * theta + shift))
         profile = profile_from_heights(heights, PERIOD)
         problem = Problem(
-            profile, SOLID, 0.06 * SOLID.modulus * profile.q0 * A**2, adhesion_range=0.05 * A
+            profile, SOLID, 0.06 * SOLID.modulus * profile.q0 * A**2, adhesion_range=0.1 * A
         )
-        loop = scenes.loop_of(problem, "zones", accuracy=1e-2, max_penetration=0.8, load_steps=10)
+        loop = scenes.loop_of(problem, "zones", accuracy=1e-2, max_penetration=0.8, load_steps=4)
         losses.append(loop)
     difference = abs(losses[1].loss - losses[0].loss)
     assert difference < losses[0].loss_error + losses[1].loss_error
