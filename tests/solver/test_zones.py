@@ -77,19 +77,12 @@ def test_no_jump_hides_in_a_step():
     assert abs(coarse.loss - fine.loss) < coarse.loss_error < 0.02 * fine.loss
 
 
-@cache
-def rough_loop(nodes_per_wave: int) -> LoopResult:
-    profile = self_affine_profile(0.4456, h_rms=1e-6, period=2e-3, n0=3, ratio=16, seed=65119)
-    problem = Problem(profile, HalfSpace(1e6, 0.0), 7.286e-3, Control(2.486e8), adhesion_range=5e-7)
-    return scenes.loop_of(
-        problem, "zones", nodes_per_wave=nodes_per_wave, accuracy=1e-2, max_penetration=0.8,
-        load_steps=2,
-    )  # fmt: skip
-
-
 def test_where_jumps_end_does_not_depend_on_the_nodes():
     """Descents that follow whatever direction lowers the energy end 1.2 % apart."""
-    coarse, fine = rough_loop(24), rough_loop(40)
+    profile = self_affine_profile(0.4456, h_rms=1e-6, period=2e-3, n0=3, ratio=16, seed=65119)
+    problem = Problem(profile, HalfSpace(1e6, 0.0), 7.286e-3, Control(2.486e8), adhesion_range=5e-7)
+    turn = {"accuracy": 1e-2, "max_penetration": 0.8, "load_steps": 2}
+    coarse, fine = (scenes.loop_of(problem, "zones", nodes_per_wave=n, **turn) for n in (24, 40))
     assert [jump.kind for jump in coarse.jumps] == [jump.kind for jump in fine.jumps]
     assert abs(coarse.loss - fine.loss) < coarse.loss_error + fine.loss_error
     assert coarse.races == fine.races == 0
@@ -104,8 +97,7 @@ def test_a_jump_that_a_viscous_interface_ends_elsewhere_is_a_race(monkeypatch, s
         end = run(self, gap, x, least)
         if not by_interface:
             return end
-        away = end.gap + shift if shift else gap
-        return replace(end, gap=away, potential=end.potential + 1e-6)
+        return replace(end, gap=end.gap + shift if shift else gap, potential=end.potential + 1e-6)
 
     monkeypatch.setattr(Descent, "run", elsewhere)
     loop = scenes.loop_of(problem_of(0.3, 0.2), "zones", max_penetration=0.5, load_steps=2)
