@@ -32,9 +32,9 @@ _ROUNDING = 64.0  # units of rounding of the heights, by which forces may be off
 _ITERATIONS = 200  # of conjugate gradients in one step
 _LOOSE = 0.1  # of the residual, to which a correction is solved far from a minimum
 _RATE = 1e-6  # of its residual, to which the rate of a branch is solved
-_STALLED = 1e3  # times that: residual where the energy falls no more
+_STALLED = 1e3  # times that of a minimum: residual where the energy falls no more
 _MOST_STEPS = 200_000
-_SLOWER, _FASTER = 2.0, 0.3  # times the damping 1/Δt after a step uphill, or a short one
+_SLOWER, _FASTER = 2.0, 0.3  # times the damping 1/Δt after a step uphill, at least after others
 _AIM = 0.7  # of the longest way: that of the next step
 _LEAST_DAMPING, _MOST_DAMPING = 0.01, 1e8  # of the stiffness of the longest wave
 

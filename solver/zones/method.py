@@ -18,7 +18,7 @@ from adhesis.solver.observables import openings_between
 from adhesis.solver.runtime.threads import one_at_a_time
 from adhesis.solver.zones.descent import Descent, Minimum
 from adhesis.solver.zones.path import Steps
-from adhesis.solver.zones.resolution import node_count, relative_error, zone_length
+from adhesis.solver.zones.resolution import node_count, zone_length
 from adhesis.solver.zones.surface import Surface
 
 _LONGEST_RANGE = 10.0  # in h_max
@@ -104,9 +104,7 @@ class ZonesMethod(Method):
         else:
             here = self._minimum(state)
         steps.run(here, prescribed)
-        share = relative_error(problem, self.surface.dx)
-        lost = sum(abs(jump.energy_drop) for jump in steps.jumps)
-        return Path(tuple(steps.states), tuple(steps.jumps), steps.error + share * lost)
+        return Path(tuple(steps.states), tuple(steps.jumps), steps.error)
 
     @one_at_a_time
     def fields(self, state: ContactState, n: int) -> Fields:

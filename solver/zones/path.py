@@ -14,6 +14,7 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.peaks import patch_ranges
 from adhesis.solver.zones.descent import Descent, Minimum
+from adhesis.solver.zones.resolution import relative_error
 from adhesis.solver.zones.surface import sharpened
 
 _FINEST = 1e-3  # of γ, or the accuracy: unit of the next two
@@ -42,7 +43,7 @@ class Steps:
         self.surface = descent.surface
         self.states: list[ContactState] = []
         self.jumps: list[Jump] = []
-        self.error = 0.0
+        self.error, self.by_nodes = 0.0, relative_error(problem, descent.surface.dx)
         self.scale = problem.prescribed_range + problem.attraction_range
         if problem.control.is_load:
             self.scale = problem.prescribed_range
@@ -94,20 +95,29 @@ class Steps:
                     step *= 0.5
                     continue
                 self._jump(here, after, (slope, slope_after), lost, here.gap + rate * step)
-                self.error += 0.0 if lost else within
+                self.error += self.by_nodes * abs(self.jumps[-1].energy_drop)
                 if lost:
+                    self.error += self._misplaced(here.separation, target)
                     return
+                self.error += within
                 step, least = whole, self.accuracy * self.scale
             else:
                 self.states.append(self.state_of(after, slope_after))
                 step = float(np.clip(2 * step, -longest, longest))
             here, rate, slope = after, rate_after, slope_after
 
+    def _misplaced(self, separation: float, load: float) -> float:
+        """Estimate the work in J/m² by which nodes misplace a loss of contact under a load, in Pa.
+
+        They do so by a share of the load; the separation varies as a square root of what is left.
+        """
+        seen = np.array([(-s.mean_stress, s.separation) for s in self.states[:-1]]).T
+        return load * abs(separation - float(np.interp((1 - self.by_nodes) * load, *seen)))
+
     def _rate(self, here: Minimum) -> tuple[Array, float]:
         """Return dg/dx and dY/dx; where nothing is attracted the gap follows what is prescribed."""
         if here.adhesion == 0:
-            moves = not self.problem.control.is_load
-            return np.full(self.surface.n, float(moves)), 0.0
+            return np.full(self.surface.n, float(not self.problem.control.is_load)), 0.0
         return self.descent.rate(here)
 
     def _conjugate(self, here: Minimum) -> float:
@@ -144,9 +154,8 @@ class Steps:
     ) -> None:
         """Append a jump that lies between two minima, at the prescribed value of the second."""
         x = after.prescribed
-        apart = here.adhesion == 0
-        start_of_jump = replace(here, prescribed=x) if apart else self.descent.at(here.gap, x)
-        before, end = self.state_of(start_of_jump, slopes[0]), self.state_of(after, slopes[1])
+        last = self.descent.at(here.gap, x) if here.adhesion else replace(here, prescribed=x)
+        before, end = self.state_of(last, slopes[0]), self.state_of(after, slopes[1])
         if lost:
             end = ContactState.detached(before.separation)
         self.states += [before, end]
