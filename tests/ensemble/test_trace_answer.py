@@ -459,7 +459,7 @@ def test_unphysical_input_is_doubted_and_zero_range_comes_first() -> None:
 def test_a_process_that_is_killed_is_said_and_replaced() -> None:
     _, _, plan = small_plan()
     loops = Loops(plan.runs, processes=1)
-    others = ranks_of(os.getpid())  # a browser of other tests, say
+    others = ranks_of(os.getpid())  # a helper of other tests, say
     killed: list[str] = []
 
     def watch(loops: Loops) -> None:
