@@ -19,7 +19,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adhesis.solver.method import PathError
 from adhesis.solver.model.control import Control
@@ -28,7 +27,9 @@ from adhesis.solver.zones.surface import Surface, ZoneEnds, product
 
 _LONGEST = 0.5  # of the range, or of the gap beyond it: way of a node in one step
 _BALANCED = 1e-6  # of the strength: residual of a minimum
-_ROUNDING = 64.0  # units of rounding of the heights, by which forces may be off
+_EPS = 64 * float(
+    np.finfo(float).eps
+)  # of heights and energies: rounding of forces and of energies
 _ITERATIONS = 200  # of conjugate gradients in one step
 _LOOSE = 0.1  # of the residual, to which a correction is solved far from a minimum
 _RATE = 1e-6  # of its residual, to which the rate of a branch is solved
@@ -53,6 +54,11 @@ class Minimum:
         In m and Pa.
     elastic, adhesion, potential : float
         Energies, the last of the control, in J/m² of nominal area.
+    free : array, shape (n,)
+        1 at the nodes that may move, 0 at those in contact.
+    residual : array, shape (n,)
+        What is out of balance at free nodes, in Pa.
+    ends : ZoneEnds
     """
 
     gap: Array
@@ -62,30 +68,9 @@ class Minimum:
     elastic: float
     adhesion: float
     potential: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Forces:
-    """Forces at a gap.
-
-    Attributes
-    ----------
-    residual : array, shape (n,)
-        What is out of balance at free nodes, in Pa.
-    free : array of bool, shape (n,)
-    longest : array, shape (n,)
-        Longest way of each node in one step, in m.
-    ends : ZoneEnds
-    """
-
+    free: Array
     residual: Array
-    free: NDArray[np.bool_]
-    longest: Array
     ends: ZoneEnds
-
-    def reach(self, way: Array) -> float:
-        """Return the largest way of a node, over the longest that it may go."""
-        return float(np.abs(way / self.longest).max())
 
 
 class Descent:
@@ -94,7 +79,7 @@ class Descent:
     def __init__(self, surface: Surface, control: Control, h_max: float) -> None:
         self.surface, self.control, self.h_max = surface, control, h_max
         self.steps = 0
-        rounding = _ROUNDING * np.finfo(float).eps * h_max * float(surface.stiffness[-1])
+        rounding = _EPS * h_max * float(surface.stiffness[-1])
         self.balanced = max(_BALANCED * float(surface.strength.min()), rounding)
 
     def run(
@@ -110,7 +95,7 @@ class Descent:
         PathError
             If there is no minimum within the largest number of steps, or the energy falls no more.
         """
-        here, forces = self._at(self._prescribe(np.maximum(gap, 0.0), x), x)
+        here = self.at(np.maximum(gap, 0.0), x)
         symbol, slowest = self.surface.stiffness, self.surface.stiffness[1]
         viscosity = np.full_like(symbol, slowest) if by_interface else np.maximum(symbol, slowest)
         damping = 0.0
@@ -119,19 +104,19 @@ class Descent:
                 return None
             if self.control.is_load and x > 0 and here.adhesion == 0:
                 return here
-            worst = float(np.abs(forces.residual).max())
+            worst = float(np.abs(here.residual).max())
             if worst < self.balanced:
                 return here
             self.steps += 1
             share = min(_LOOSE, math.sqrt(worst / float(self.surface.strength.max())))
-            stiffness = symbol + damping * viscosity
-            way, length = self._solve(forces.residual, forces, share, 1.0, stiffness)
+            way, length = self._solve(here, here.residual, share, 1.0, symbol + damping * viscosity)
             downhill = False
             if length < math.inf:
-                way /= max(1.0, length)
-                later = self._prescribe(np.maximum(here.gap + way, 0.0), x)
-                after, forces_after = self._at(later, x)
-                downhill = after.potential < here.potential
+                after = self.at(np.maximum(here.gap + way / max(1.0, length), 0.0), x)
+                fall = here.potential - after.potential
+                noise = _EPS * (here.elastic - here.adhesion)
+                calmer = float(np.abs(after.residual).max()) < worst
+                downhill = fall > (-noise if calmer else noise)
             if not downhill:
                 damping = max(1.0, _SLOWER * damping)
                 if damping < _MOST_DAMPING:
@@ -139,7 +124,7 @@ class Descent:
                 if worst < _STALLED * self.balanced:  # the energy is at its rounding
                     return here
                 break
-            here, forces = after, forces_after
+            here = after
             damping *= min(1.0, max(length / _AIM, _FASTER)) * (damping > _LEAST_DAMPING)
         raise PathError(
             f"the descent ends at no minimum, at a prescribed {x:g} (in m, under a load in Pa): "
@@ -147,33 +132,28 @@ class Descent:
         )
 
     def at(self, gap: Array, x: float) -> Minimum:
-        """Return a gap with its energies at the prescribed value ``x``."""
-        return self._at(self._prescribe(gap, x), x)[0]
-
-    def _prescribe(self, gap: Array, x: float) -> Array:
-        """Give a gap the prescribed mean, by stretching it."""
-        return gap * (x / gap.mean()) if self.control.is_fixed else gap
-
-    def _at(self, gap: Array, x: float) -> tuple[Minimum, _Forces]:
-        """Compute energies and forces at a gap."""
+        """Compute energies and forces at a gap; at a fixed separation it is stretched to that."""
         surface, control = self.surface, self.control
+        if control.is_fixed:
+            gap = gap * (x / gap.mean())
         lifted = gap + surface.height
         restoring = surface.filter(surface.stiffness, lifted)
         adhesion, tension, ends = surface.attract(gap)
         gradient = restoring + tension
-        free = gap > 0
+        free: Array = np.where(gap > 0, 1.0, 0.0)
         separation = float(gap.mean())
         p = -x if control.is_load else control.stiffness * (separation - x)
         if control.is_fixed:
-            p = -float(gradient[free].mean())
-        free |= gradient + p < -self.balanced  # contact that is pulled off
+            p = -_mean(gradient, free)
+        free[gradient + p < -self.balanced] = 1.0  # contact that is pulled off
         if control.is_fixed:
-            p = -float(gradient[free].mean())
+            p = -_mean(gradient, free)
         elastic = 0.5 * product(lifted, restoring) / surface.n
         potential = control.potential(elastic + adhesion, separation, p, self.h_max, 1.0)
-        here = Minimum(gap, x, separation, p, elastic, adhesion, potential)
-        longest = _LONGEST * np.maximum(gap - surface.range, surface.range)
-        return here, _Forces(np.where(free, gradient + p, 0.0), free, longest, ends)
+        residual = (gradient + p) * free
+        return Minimum(
+            gap, x, separation, p, elastic, adhesion, potential, free, residual, ends
+        )  # fmt: skip
 
     def rate(self, here: Minimum) -> tuple[Array, float]:
         """Compute dg/dx and dY/dx along the branch of a minimum, Y the conjugate of the control.
@@ -181,23 +161,21 @@ class Descent:
         To a millionth: of stiff solids the loss is a small difference of large works.
         """
         control, stiffness = self.control, self.surface.stiffness
-        _, forces = self._at(here.gap, here.prescribed)
-        uniform = forces.free.astype(float)
+        start = here.free / here.free.mean()
         if control.is_fixed:
-            start = uniform / uniform.mean()
-            out_of_balance = self._restrict(self._stiffen(start, forces, stiffness), forces)
+            out_of_balance = self._restrict(self._stiffen(start, here, stiffness), here)
         else:
-            start = 0.0 * uniform
-            out_of_balance = -uniform * (1.0 if control.is_load else control.stiffness)
-        way, _ = self._solve(out_of_balance, forces, _RATE, math.inf, stiffness)
+            start *= 0.0
+            out_of_balance = -here.free * (1.0 if control.is_load else control.stiffness)
+        way, _ = self._solve(here, out_of_balance, _RATE, math.inf, stiffness)
         way += start
         if control.is_fixed:
-            return way, -float(self._stiffen(way, forces, stiffness)[forces.free].mean())
+            return way, -_mean(self._stiffen(way, here, stiffness), here.free)
         moved = float(way.mean())
         return way, moved if control.is_load else control.stiffness * (moved - 1.0)
 
     def _solve(
-        self, residual: Array, forces: _Forces, share: float, longest: float, stiffness: Array
+        self, here: Minimum, residual: Array, share: float, longest: float, stiffness: Array
     ) -> tuple[Array, float]:
         """Balance a residual to a share of it by a motion.
 
@@ -206,37 +184,42 @@ class Descent:
         """
         surface = self.surface
         way, residual = np.zeros(surface.n), residual.copy()
+        may_go = _LONGEST * np.maximum(here.gap - surface.range, surface.range)
         compliance = 1 / np.maximum(stiffness, surface.stiffness[1])
         enough = share * math.sqrt(product(residual, residual))
-        fall = self._restrict(surface.filter(compliance, residual), forces)
+        fall = self._restrict(surface.filter(compliance, residual), here)
         direction, force = -fall, product(residual, fall)
         length = 0.0
         for _ in range(_ITERATIONS):
-            change = self._restrict(self._stiffen(direction, forces, stiffness), forces)
+            change = self._restrict(self._stiffen(direction, here, stiffness), here)
             curvature = product(direction, change)
             if curvature <= 0:
                 return way, math.inf
             way += (force / curvature) * direction
             residual += (force / curvature) * change
-            length = forces.reach(way)
+            length = float(np.abs(way / may_go).max())
             if product(residual, residual) <= enough**2 or length > longest:
                 break
-            fall = self._restrict(surface.filter(compliance, residual), forces)
+            fall = self._restrict(surface.filter(compliance, residual), here)
             before, force = force, product(residual, fall)
             direction = (force / before) * direction - fall
         return way, length
 
-    def _stiffen(self, motion: Array, forces: _Forces, stiffness: Array) -> Array:
+    def _stiffen(self, motion: Array, here: Minimum, stiffness: Array) -> Array:
         """Compute by how much a motion changes the forces at all nodes, in Pa."""
         change = self.surface.filter(stiffness, motion)
-        forces.ends.force_by(motion, change)
+        here.ends.force_by(motion, change)
         if not (self.control.is_fixed or self.control.is_load):
             change += self.control.stiffness * motion.mean()
         return change
 
-    def _restrict(self, values: Array, forces: _Forces) -> Array:
+    def _restrict(self, values: Array, here: Minimum) -> Array:
         """Restrict to motions of free nodes, at a fixed separation to those without a mean."""
-        free = forces.free
         if self.control.is_fixed:
-            values = values - values[free].mean()
-        return np.asarray(np.where(free, values, 0.0), dtype=np.float64)
+            values = values - _mean(values, here.free)
+        return values * here.free
+
+
+def _mean(values: Array, free: Array) -> float:
+    """Return the mean over the free nodes."""
+    return product(values, free) / float(np.add.reduce(free))

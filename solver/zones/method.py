@@ -5,7 +5,7 @@ Algorithm and accuracy are described in docs/methods.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -142,11 +142,9 @@ class ZonesMethod(Method):
         )
 
     def _apart(self, separation: float, prescribed: float) -> Minimum:
-        gap = separation - self.surface.height
-        potential = self.problem.control.potential(
-            0.0, separation, 0.0, self.problem.profile.h_max, 1.0
-        )
-        return Minimum(gap, prescribed, separation, 0.0, 0.0, 0.0, potential)
+        hold = self.problem.control.potential(0.0, separation, 0.0, self.problem.profile.h_max, 1.0)
+        here = self.descent.at(separation - self.surface.height, prescribed)
+        return replace(here, mean_stress=0.0, elastic=0.0, adhesion=0.0, potential=hold)
 
     def _minimum(self, state: ContactState) -> Minimum:
         """Return the minimum of a state of this method.

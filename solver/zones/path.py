@@ -22,6 +22,7 @@ _SMOOTH = 0.1  # of the unit, shared by the range: loss of a step that counts as
 _NOISE = 0.01  # of the unit: loss of a step by a node that comes into contact or zone
 _BENT = 0.2  # of what ΔY Δx is off the slopes: counts as a loss of a step
 _LOCATED = 0.3  # of the accuracy times the drop, or of the noise: work within which a jump lies
+_SETTLED = 0.01  # of that: work within which a jump lies that races
 _LONGEST = 0.05  # of the range: jumps hide in longer steps
 _NEAREST = 1e-9  # of the range: shortest step
 _MOVED = 0.1  # of the range of adhesion: gaps of two minima differ by more
@@ -35,7 +36,7 @@ class Steps:
     slopes at both its ends. On a branch L is of fifth order in the step, and ΔY less that of the
     slopes of third order: a jump may hide in one of both. A step with a larger one is halved until
     the work |ΔY Δx| within which the jump lies is small beside its drop. A descent on the way to
-    that is ended as soon as W is below what a branch may have.
+    that is ended as soon as W is below what a branch may have; then each step is half of the last.
     """
 
     def __init__(self, problem: Problem, descent: Descent, accuracy: float, branch: Branch) -> None:
@@ -61,7 +62,7 @@ class Steps:
         longest = _LONGEST * self.scale
         whole = step = float(np.clip(prescribed - here.prescribed, -longest, longest))
         rate, slope = self._rate(here)
-        least = self.accuracy * self.scale
+        least, growth = self.accuracy * self.scale, 2.0
         while here.prescribed != prescribed:
             remaining = prescribed - here.prescribed
             if abs(step) >= abs(remaining) * (1 - 1e-9):
@@ -70,7 +71,7 @@ class Steps:
             divisible = abs(step) > least
             after = self._descend(here, rate, slope, target, divisible)
             if after is None:
-                step *= 0.5
+                step, growth = 0.5 * step, 0.5
                 continue
             if not (control.is_fixed or after.gap.any()):
                 raise PathError(self.problem.full_contact(target))
@@ -88,22 +89,26 @@ class Steps:
             by_rule = loss - 0.5 * abs(change * step)
             if begins_or_ends or max(abs(smooth), by_rule, _BENT * bent) > allowed:
                 located = _LOCATED * max(self.accuracy * abs(loss), _NOISE * self.unit)
+                start = here.gap + rate * step
+                at_stake = None if within > located else self._at_stake(start, after)
+                located *= 1.0 if at_stake is None else _SETTLED
                 if (lost or within > located) and abs(step) > _NEAREST * self.scale:
                     # the separation at the loss of contact varies as a square root of the load
                     wanted = 0.0 if lost else abs(step) * located / within
                     least = min(0.5 * abs(step), max(wanted, _NEAREST * self.scale))
                     step *= 0.5
                     continue
-                self._jump(here, after, (slope, slope_after), lost, here.gap + rate * step)
+                self._jump(here, after, (slope, slope_after), at_stake)
                 self.error += self.by_nodes * abs(self.jumps[-1].energy_drop)
                 if lost:
                     self.error += self._misplaced(here.separation, target)
                     return
                 self.error += within
-                step, least = whole, self.accuracy * self.scale
+                step, least, growth = whole, self.accuracy * self.scale, 2.0
             else:
                 self.states.append(self.state_of(after, slope_after))
-                step = float(np.clip(2 * step, -longest, longest))
+                step = float(np.clip(growth * step, -longest, longest))
+                growth = growth if abs(step) > least else 2.0
             here, rate, slope = after, rate_after, slope_after
 
     def _misplaced(self, separation: float, load: float) -> float:
@@ -130,9 +135,9 @@ class Steps:
     ) -> Minimum | None:
         """Descend at ``target``; None if the step has to be divided."""
         step = target - here.prescribed
-        bent = 0.5 * slope * step**2
-        least = here.potential - self._conjugate(here) * step - bent - 2 * (abs(bent) + self.unit)
-        return self.descent.run(here.gap + step * rate, target, least if divisible else -math.inf)
+        fall = self._conjugate(here) * step + 1.5 * abs(slope) * step**2 + 2 * _NOISE * self.unit
+        least = here.potential - fall if divisible else -math.inf
+        return self.descent.run(here.gap + step * rate, target, least)
 
     def _at_stake(self, start: Array, after: Minimum) -> float | None:
         """Energy in J/m² by which a jump ends elsewhere with a viscous interface, or None.
@@ -150,18 +155,18 @@ class Steps:
         return abs(other.potential - after.potential) if moved else None
 
     def _jump(
-        self, here: Minimum, after: Minimum, slopes: tuple[float, float], lost: bool, start: Array
+        self, here: Minimum, after: Minimum, slopes: tuple[float, float], at_stake: float | None
     ) -> None:
         """Append a jump that lies between two minima, at the prescribed value of the second."""
         x = after.prescribed
         last = self.descent.at(here.gap, x) if here.adhesion else replace(here, prescribed=x)
         before, end = self.state_of(last, slopes[0]), self.state_of(after, slopes[1])
+        lost = self.problem.control.is_load and x > 0 and after.adhesion == 0
         if lost:
             end = ContactState.detached(before.separation)
         self.states += [before, end]
         if not before.contact_fraction:
             before = replace(before, edges=np.empty((0, 2)))
-        at_stake = self._at_stake(start, after)
         jump = Jump.between(
             before, end, self.branch, self.surface.period, raced=at_stake is not None,
             at_stake=at_stake or 0.0, opens=_opens(here.gap, after.gap), falls_off=lost,
