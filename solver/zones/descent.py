@@ -27,9 +27,7 @@ from adhesis.solver.zones.surface import Surface, ZoneEnds, product
 
 _LONGEST = 0.5  # of the range, or of the gap beyond it: way of a node in one step
 _BALANCED = 1e-6  # of the strength: residual of a minimum
-_EPS = 64 * float(
-    np.finfo(float).eps
-)  # of heights and energies: rounding of forces and of energies
+_ROUNDING = 64.0  # units of rounding of the heights, by which forces may be off
 _ITERATIONS = 200  # of conjugate gradients in one step
 _LOOSE = 0.1  # of the residual, to which a correction is solved far from a minimum
 _RATE = 1e-6  # of its residual, to which the rate of a branch is solved
@@ -79,8 +77,8 @@ class Descent:
     def __init__(self, surface: Surface, control: Control, h_max: float) -> None:
         self.surface, self.control, self.h_max = surface, control, h_max
         self.steps = 0
-        rounding = _EPS * h_max * float(surface.stiffness[-1])
-        self.balanced = max(_BALANCED * float(surface.strength.min()), rounding)
+        self.rounding = _ROUNDING * np.finfo(float).eps * h_max * float(surface.stiffness[-1])
+        self.balanced = max(_BALANCED * float(surface.strength.min()), self.rounding)
 
     def run(
         self, gap: Array, x: float, least: float = -math.inf, *, by_interface: bool = False
@@ -114,9 +112,9 @@ class Descent:
             if length < math.inf:
                 after = self.at(np.maximum(here.gap + way / max(1.0, length), 0.0), x)
                 fall = here.potential - after.potential
-                noise = _EPS * (here.elastic - here.adhesion)
-                calmer = float(np.abs(after.residual).max()) < worst
-                downhill = fall > (-noise if calmer else noise)
+                if abs(fall) < self.rounding * self.h_max:  # by the forces
+                    fall = -product(here.residual + after.residual, after.gap - here.gap)
+                downhill = fall > 0
             if not downhill:
                 damping = max(1.0, _SLOWER * damping)
                 if damping < _MOST_DAMPING:

@@ -57,6 +57,31 @@ def test_a_wave_loses_what_dugdales_law_has_it_lose(alpha, share):
     assert abs(fine.loss_from_drops - exact) < 1e-4 * wave.loop.loss
 
 
+def test_a_short_contact_of_dugdales_wave_is_maugis_line_contact():
+    """Johnson and Greenwood, J. Phys. D 41 (2008) 155315, with half-widths a, c = m a."""
+    wave, delta, modulus = wave_of(0.005), 5e-4 * A, SOLID.modulus
+    radius, strength = 1 / (A * (2 * np.pi / PERIOD) ** 2), wave.work_of_adhesion / delta
+    a, exact = 0.5 * np.sqrt(radius * delta), DugdaleWave(wave, delta)
+    m = exact.zone_end(a) / a
+    rise, angle = np.sqrt(m**2 - 1), np.arccosh(m)
+    gap = a**2 / (2 * radius) * (m * rise - angle)
+    gap += 4 * strength * a / (np.pi * modulus) * (rise * angle - m * np.log(m))
+    assert gap == pytest.approx(delta, rel=1e-4)
+    force = np.pi * modulus * a**2 / (4 * radius) - 2 * strength * a * rise
+    assert exact.state(a)[1] * PERIOD == pytest.approx(force, rel=1e-4)
+
+
+def test_a_stiff_solid_is_pulled_as_a_rigid_one_by_bradley_and_derjaguin():
+    """The tension is the strength where the gap is within the range."""
+    method = make_method("zones", problem_of(0.005, 0.5))
+    states = method.follow(method.detached(1.6 * A), 1.05 * A).states[2:]
+    s, p = np.transpose([(state.separation, state.mean_stress) for state in states])
+    within = np.arccos(s / A - 0.5) / np.pi
+    assert len(s) > 5
+    strength = method.problem.strength
+    assert p == pytest.approx(-strength * within, abs=3e-4 * strength)
+
+
 def test_the_loss_of_a_wave_converges_with_the_square_of_the_nodes():
     """Zones of 5 and of 14 nodes."""
     exact = DugdaleWave(wave_of(0.2), 0.05 * A).loss
