@@ -38,7 +38,6 @@ from adhesis.solver.model.profile import Array, Integers
 _ASYMMETRY = 3e-5  # of h_max: a wave of the period that is added to a profile with a symmetry
 _HELD = 0.38682513  # κ
 _WEIGHTS = np.array([-1, 14, -1, 0]) / 12  # of v - Δx² v''/12, at a node
-_NEWTON = 6  # steps to the end of a zone; to rounding in five at most
 _Value = TypeVar("_Value", bound=np.generic)
 
 
@@ -124,11 +123,11 @@ class Surface:
         missing, rise = self.range - gap[near], gap[far] - gap[near]
         strength = self.strength[across]
         held = np.minimum(self.held_back * strength, 0.5 * rise)
-        share = missing / rise
-        for _ in range(_NEWTON):
-            excess = share * (rise + 2 * held * (1 - share) * (1 - 2 * share)) - missing
-            slope = rise + 2 * held * (1 - 6 * share * (1 - share))
-            share -= excess / slope
+        # rise t + 2 held (t - 3t² + 2t³) = missing, a cubic in t - ½ with one real root
+        p, q = (rise - held) / (4 * held), (0.5 * rise - missing) / (4 * held)
+        root = np.sqrt(p / 3)
+        share = 0.5 - 2 * root * np.sinh(np.arcsinh(0.5 * q / root**3) / 3)
+        slope = rise + 2 * held * (1 - 6 * share * (1 - share))
         even = 0.5 * (share * (1 - share)) ** 2
         energy += product(strength, share * (0.5 * rise * share - missing) + 2 * held * even)
         meets = held == 0.5 * rise
