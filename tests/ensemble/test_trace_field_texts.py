@@ -25,6 +25,7 @@ Z = 1e-6 * np.array(ZS, dtype=float)
 PAIRS = list(zip(XS, ZS, strict=True))
 UM = "x (um),z (um)"
 TWO = [f"{x},{z}" for x, z in PAIRS]
+ROWS = [f"{x};{z}" for x, z in PAIRS]
 RU = [row.replace(",", ";").replace(".", ",") for row in TWO]
 
 
@@ -63,6 +64,8 @@ READ: dict[str, Any] = {
     "Å behind a name": ["Lateral um,Raw Å,", *(f"{x},{1e4 * float(z):.2f}," for x, z in PAIRS)],
     "a unit in Japanese": ["測定ピッチ,0.5,um", "単位,um", "データ", *ZS],
     "units by option": ([f"{x} {z}" for x, z in PAIRS], {"unit": "um"}),
+    "units by option below those of results": (["Ra;nm", "Lc;mm", "x;z", *ROWS], {"unit": "um"}),
+    "labels and their units": ["Unit X;um", "Unit Z;um", "x;z", *ROWS],
     "inches and their parts": (
         ["X (in),Z (µin)", *(f"{k / 50_800:.12f},{z / 25.4e-9:.9f}" for k, z in enumerate(Z))],
     ),
@@ -644,7 +647,7 @@ Amplitude Error(nm)|height difference (nm)|log 높이 (nm)|1/z (nm)|z+offset (nm
 OTHER_UNITS = "V|mV|µV|A|nA|s|ms|deg|°|rad|counts|a.u.|N|Hz|px|%|nm²|nm^2|1/nm|nm/V|V/nm|LSB"
 
 
-FEW = [f"{x};{z}" for x, z in PAIRS[:40]]  # what is refused for its header needs no more
+FEW = ROWS[:40]  # what is refused for its header needs no more
 
 
 @pytest.mark.parametrize("name", re.split(r"[|\n]", NOT_HEIGHTS.strip()))
@@ -691,8 +694,7 @@ def test_another_step_than_that_in_use_is_noted(tmp_path: Path) -> None:
 
 
 def test_a_depth_is_noted_and_an_angstrom_read(tmp_path: Path) -> None:
-    two = [f"{x};{z}" for x, z in PAIRS]
-    notes = read_trace(put(tmp_path / "t.txt", ["x (um);Depth (um)", *two])).notes
+    notes = read_trace(put(tmp_path / "t.txt", ["x (um);Depth (um)", *ROWS])).notes
     assert "their column is named 'Depth (um)': give invert if they grow into the sample" in notes
     rows = [f"{x};{1e4 * float(z):.2f}" for x, z in PAIRS]
     trace = read_trace(put(tmp_path / "t.txt", ["X [um];Z [A]", *rows]))

@@ -269,6 +269,8 @@ def _row_of_units(row: Sequence[Column], above: Sequence[Column] | None) -> Head
     if any(_VALUE.search(column.plain) for column in row) or not any(c.has_unit for c in row):
         return None
     bare = all(column.is_bare for column in row)
+    if not (bare or row[0].is_bare or row[0].has_unit) and row[-1].is_bare:
+        return None  # "Z unit;um", "Rz;nm": a label and its unit
     names = above if bare and above else row
     if len(row) == 1 and row[0].unit and names[0].words and not names[0].names(False):
         return None  # above heights alone, it is about positions
