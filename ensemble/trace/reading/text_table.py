@@ -341,6 +341,7 @@ class _Row:
 
     fields: list[str]
     values: list[float]
+    is_whole: bool  # whether it has as many fields as there are columns
 
     @property
     def is_empty(self) -> bool:
@@ -381,11 +382,8 @@ class _Reader:
         if len(fields) > self.count or len(numbers) < len(fields):
             return None
         lacking = self.count - len(fields)
-        return _Row(fields + [""] * lacking, numbers + [nan] * lacking)
-
-    def is_whole(self, place: int) -> bool:
-        """Return whether a line holds as many fields as there are columns."""
-        return len(split(self.lines[place], self.delimiter)) >= self.count
+        is_whole = len(split(line, self.delimiter)) >= self.count
+        return _Row(fields + [""] * lacking, numbers + [nan] * lacking, is_whole)
 
     def holds_row(self, place: int) -> bool:
         """Return whether a row holds a number, or a word for a missing one in its columns.
@@ -394,7 +392,7 @@ class _Reader:
         """
         row = self.rows[place]
         held = self.lines[place].strip() if self.count == 1 else any(row.fields)
-        return not row.is_empty or (self.is_whole(place) and bool(held))
+        return not row.is_empty or (row.is_whole and bool(held))
 
     def may_be_row(self, place: int, adjoins: bool) -> bool:
         """Return whether a line holds a row of numbers, or what may be a damaged one.
@@ -402,7 +400,7 @@ class _Reader:
         One that ``adjoins`` the rows may be one if it begins with a number or has no word.
         """
         if place in self.rows:
-            return adjoins or self.is_whole(place)
+            return adjoins or self.rows[place].is_whole
         line = self.lines[place].strip(' "')
         if not line or line[0] in COMMENT or self.holds_names(place):
             return False
@@ -426,7 +424,7 @@ def _first_row(reader: _Reader) -> int | None:
     needed = 1 if reader.count >= _LONG_ROW else _ROWS_TO_BEGIN
     for place in range(len(reader.lines)):
         row = reader.rows.get(place)
-        if row is None or (not row.is_empty and not reader.is_whole(place)):
+        if row is None or (not row.is_empty and not row.is_whole):
             found = []
         elif not row.is_empty:
             found.append(place)
@@ -460,7 +458,7 @@ def _block(reader: _Reader, start: int) -> list[int]:
         row = reader.rows.get(place)
         if row is None:
             break
-        lacks = not row.is_empty and not reader.is_whole(place)
+        lacks = not row.is_empty and not row.is_whole
         if lacks and reader.delimiter == " " and reader.count > 2:
             reader.refuse(
                 place,
