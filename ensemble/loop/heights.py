@@ -50,10 +50,9 @@ def read_heights(
         raise InputError(f"--unit is {unit!r}: with --heights it is one unit, that of the heights")
     source = source_of(path)
     if not source.holds_numbers():
-        raise InputError(
-            source.container()
-            or f"{path} is neither text nor .npy: --trace reads files of instruments, and a text "
-            "that holds zero bytes (UTF-16 without a mark) is to be saved as UTF-8"
+        source.refuse(
+            "is neither text nor .npy: --trace reads files of instruments, and a text that holds "
+            "zero bytes (UTF-16 without a mark) is to be saved as UTF-8"
         )
     table = None if source.is_npy else read_table(source, delimiter, decimal, may_be_row=True)
     columns = table.columns[list(table.filled)] if table else np.atleast_2d(load_array(source)).T
@@ -67,18 +66,15 @@ def read_heights(
     if table:
         refuse_uneven_rows(source, table.lines)
         found = units_of_header(table.header, table.fields)
+    heights, codes = without_codes(heights, known_alone=True)
     missing = np.flatnonzero(~np.isfinite(heights))
     if missing.size:
         where = f"on line {table.lines[missing[0]]}" if table else f"at index {missing[0]}"
+        if codes:
+            where += f" (there are {codes}, which instruments write for missing ones)"
         raise InputError(
             f"{path} has no finite height {where}: --heights needs every height of the period "
             "(adhesis trace fills gaps)"
-        )
-    if codes := without_codes(heights, known_alone=True)[1]:
-        raise InputError(
-            f"{source} has {codes.removesuffix(' taken as drop-outs')}, which instruments write "
-            "for missing ones: --heights needs every height of the period (adhesis trace fills "
-            "gaps; give them in another unit if they are heights)"
         )
     # No note says that the option overruled a line of the header, so it is refused as a name is;
     # metres are assumed in any case.
@@ -91,6 +87,8 @@ def read_heights(
         said.append(
             f"they are named {found.depth!r}: change their sign if they grow into the sample"
         )
+    if codes := without_codes(heights)[1]:
+        said.append(f"{codes} may stand for missing ones, which adhesis trace fills")
     if table:
         said.extend(other_steps(table.header, table.decimal, period / heights.size))
     return np.asarray(heights * LENGTH.units[of_heights]), "; ".join(said)

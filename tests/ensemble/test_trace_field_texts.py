@@ -215,11 +215,13 @@ def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: 
     def rows(marked: range = range(40, 43)) -> list[str]:
         return [f"{UM},valid", *(f"{row},{int(k not in marked)}" for k, row in enumerate(TWO))]
 
-    trace = read_trace(put(tmp_path / "t.csv", rows()), columns=[1, 2])
+    lines = rows()
+    lines[11] = lines[11][:-1]  # one row has no flag
+    trace = read_trace(put(tmp_path / "t.csv", lines), columns=[1, 2])
     assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40, 41, 42]
-    other = [row.replace("valid", "flag") for row in rows()]
+    other = [row.replace("valid", "flag") for row in [*rows()[:-1], f"{TWO[-1]},2"]]
     trace = read_trace(put(tmp_path / "t.csv", other), columns=[1, 2])
-    assert "column 3 (flag) holds 0 and 1 alone: it is not used" in trace.notes
+    assert "column 3 (flag) holds 0 and 1 and 2 alone: it is not used" in trace.notes
     for good, bad in ("255", "0"), ("1", "-1"), ("True", "False"), ("ok", "NG"):
         words = [re.sub(",1$", f",{good}", re.sub(",0$", f",{bad}", row)) for row in rows()]
         trace = read_trace(put(tmp_path / "t.csv", words), columns=[1, 2])
@@ -281,10 +283,6 @@ def test_a_row_of_words_for_missing_numbers_keeps_its_place(tmp_path: Path) -> N
     double = "\n\n".join([*counted[:50], ";", *counted[51:]])
     with pytest.raises(InputError, match=r"unevenly at 1 place, the first on line 101"):
         read_trace(put(tmp_path / "t.csv", double), columns=[2], step=STEP)
-    flagged = ["x (um),z (um),valid", *(f"{row},{int(k != 40)}" for k, row in enumerate(TWO))]
-    flagged[11] = flagged[11][:-1]  # one row has no flag
-    trace = read_trace(put(tmp_path / "t.csv", flagged), columns=[1, 2])
-    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40]
 
 
 @pytest.mark.parametrize(
@@ -382,6 +380,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "SMD with zero bytes": ("\0\n".join(SMD).encode(), Z_UM, r"ISO 5436-2 \(SMD\)"),
     "its heights and checksum": ([*ZS, "#\x03", "34582"], Z_UM, "line 401 .* it ends the rows"),
     "SDF, spaced": (["aBCR - 1.0", *SDF], r"a variant of SDF \(ISO 25178-71\)"),
+    "SDF without a dash": ([" aISO 1.0", *SDF], Z_UM, r"a variant of SDF \(ISO 25178-71\)"),
     "Korean": ("\n".join(["위치(㎛),높이(㎛)", *TWO]).encode("cp949"), "states no unit"),
     "thousands by blanks in one column": (
         ["z (nm)", *(f"{2e4 + 1e4 * float(z):,.2f}".replace(",", " ") for z in ZS)],
@@ -686,6 +685,7 @@ def test_another_step_than_that_in_use_is_noted(tmp_path: Path) -> None:
     of_stage = ["x (um),y (um),z (um)", *(f"{k / 2},{3 * k / 8},{z}" for k, z in enumerate(ZS))]
     for text, *options, note in (
         (counted, "the header has a step or pitch of 500 nm, against a step of 1 µm"),
+        (counted[2:], {"unit": "um", "step": None}, "the first column is taken as positions: give"),
         ([UM, *TWO], {"columns": [2]}, "column 1 (x (um)) has steps of 0.5, as positions or a c"),
         (of_stage, {"columns": [1, 3], "step": None}, "column 2 (y (um)) has steps of 0.375, as"),
     ):

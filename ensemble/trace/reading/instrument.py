@@ -53,13 +53,12 @@ def read_scan(
             text = _one_line(error)
             if text.startswith("tried "):  # and then lists every reader
                 _refuse_unknown(source)
-            _refuse(source, f"is no instrument format that can be read: {text}")
+            source.refuse(f"is no instrument format that can be read: {text}")
         chosen = _channel(source, channels, channel)
         if chosen.physical_sizes is None or chosen.unit is None:
             if reader.format() in _TAKE_ANYTHING:
                 _refuse_unknown(source)
-            _refuse(
-                source,
+            source.refuse(
                 f"states no lengths or no unit of its heights ({_name(reader)}): export them as "
                 f"text, and give {parameter('step')} and {parameter('unit')}",
             )
@@ -70,7 +69,7 @@ def read_scan(
         except InputError:
             raise
         except Exception as error:
-            _refuse(source, f"cannot be read as heights: {_one_line(error)}")
+            source.refuse(f"cannot be read as heights: {_one_line(error)}")
     metres = LENGTH.units[LENGTH.unit_named(str(topography.unit))]
     label = f"{_name(reader)}, channel {chosen.name!r}{where}, lengths in {topography.unit}"
     return positions * metres, heights * metres, label, _tip_radius(topography)
@@ -92,20 +91,13 @@ def _quiet() -> Iterator[None]:
         logging.root.removeHandler(nowhere)
 
 
-def _refuse(source: Source, sentence: str) -> NoReturn:
-    """Raise InputError; a workbook or an archive is named as that."""
-    raise InputError(source.container() or f"{source} {sentence}") from None
-
-
 def _refuse_unknown(source: Source) -> NoReturn:
     if not source.holds_zero_bytes():
-        _refuse(
-            source,
+        source.refuse(
             "begins as an instrument's file, and no reader of them can read it: it is damaged, cut "
             "off, or of another version, so export the trace as text",
         )
-    _refuse(
-        source,
+    source.refuse(
         "is neither text nor an instrument format that can be read: it holds zero bytes (a padded "
         "text, or one in UTF-16 without a mark, is to be saved anew as UTF-8), and no reader of "
         "instruments' files knows it",

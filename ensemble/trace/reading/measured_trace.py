@@ -130,8 +130,8 @@ class Trace(ByValue):
             )
         if not _SHORTEST <= self.length <= _LONGEST:
             raise InputError(
-                f"{self.source} would be {self.length:.3g} m long: is its unit right "
-                f"({parameter('unit')})?"
+                f"{self.source} would be {self.length:.3g} m long: are unit and step right "
+                f"({parameter('unit')}, {parameter('step')})?"
             )
         super().__post_init__()
 
@@ -241,7 +241,8 @@ def read_trace(
         channel = None if channel is None else checks.whole(parameter("channel"), channel, _ROW)
     in_memory = _table_of(source, wanted)
     if in_memory is not None:
-        _refuse_options("files", channel=channel, delimiter=delimiter, decimal=decimal)
+        if given := _first_given(channel=channel, delimiter=delimiter, decimal=decimal):
+            raise InputError(f"{given} belongs to files")
         name, form, table = in_memory
         return _from_table(name, table, unit, step, wanted, row, form)
     source = source_of(source)
@@ -258,18 +259,18 @@ def read_trace(
         )
         form = "npy" if is_npy else f"text, {table.form}"
         return _from_table(source.name, table, unit, step, wanted, row, form)
-    _refuse_options(
-        "texts: an instrument's file states its own lengths (a text that holds zero bytes, as in "
-        "UTF-16 without a mark, is to be saved as UTF-8)",
-        unit=unit, step=step, columns=columns,
-    )  # fmt: skip
+    if given := _first_given(unit=unit, step=step, columns=columns):
+        source.refuse(
+            f"is no text, and {given} belongs to texts: an instrument's file states its own "
+            "lengths (a text that holds zero bytes, as in UTF-16 without a mark, is to be saved as "
+            "UTF-8)"
+        )
     if not available():
         # Without the extra it is not known whether this is a file of an instrument.
-        raise InputError(
-            source.container()
-            or f"{source} is no plain text (one that holds zero bytes, as in UTF-16 without a "
-            "mark, is to be saved as UTF-8): export the trace as text, or, if it is an "
-            f"instrument's file, install the optional package SurfaceTopography, {HINT}"
+        source.refuse(
+            "is no plain text (one that holds zero bytes, as in UTF-16 without a mark, is to be "
+            "saved as UTF-8): export the trace as text, or, if it is an instrument's file, install "
+            f"the optional package SurfaceTopography, {HINT}"
         )
     positions, heights, description, tip_radius = read_scan(source, row, channel)
     heights, gaps = without_codes(heights)
@@ -280,14 +281,13 @@ def read_trace(
             f"{source} would be {length_text(length)} long, and rise by {slope:.3g} times its step "
             "from point to point: its lengths are wrong or damaged, so export it as text with units"
         )
-    notes = [description, *filter(None, [gaps]), *notes]
+    notes = [description, *([f"{gaps} taken as drop-outs"] if gaps else []), *notes]
     return Trace(heights, step, source.name, tuple(notes), tip_radius)
 
 
-def _refuse_options(to_what: str, **options: object) -> None:
-    for name, value in options.items():
-        if value is not None:
-            raise InputError(f"{parameter(name)} belongs to {to_what}")
+def _first_given(**options: object) -> str | None:
+    """Return the first of these parameters that is given."""
+    return next((parameter(name) for name, value in options.items() if value is not None), None)
 
 
 def load_array(source: Source) -> Array:
@@ -409,10 +409,10 @@ def _from_table(
 ) -> Trace:
     notes = [form]
     names: Sequence[Sequence[str]]
-    lines: Array | None
     if row is not None and wanted is None and len(table.filled) > 2:
-        columns, names, lines = _row_of_map(name, table, row, notes), (), None
+        columns, names = _row_of_map(name, table, row, notes), ()
         places = table.lines[: row + 1]
+        lines = places[-1:].repeat(columns.size)
     else:
         columns, names, lines = _chosen(name, table, wanted, row, notes)
         columns, lines = _scan_line(name, table, columns, lines, row, notes)
@@ -434,6 +434,9 @@ def _from_table(
             step = given
             columns, lines, left_out = _at_counts(columns, places)
             notes.append(f"the first column counts the points{left_out}")
+        elif _counts_points(columns[0]):
+            asked = f"give {parameter('step')} if it counts the points"
+            notes.append(f"the first column is taken as positions: {asked}")
     if len(columns) == 1 and (empty := int(np.sum(np.diff(places) - 1))):
         notes.append(f"{counted(empty, 'empty row')} left out")
     (x_unit, z_unit), given_by = units_of_columns(name, found, unit, columns, step)
@@ -446,7 +449,7 @@ def _from_table(
             "the sample"
         )
     if gaps:
-        notes.append(gaps)
+        notes.append(f"{gaps} taken as drop-outs")
     if len(columns) == 2:
         if step is not None:
             raise InputError(
@@ -662,16 +665,15 @@ def _step_beside_count(
     return step
 
 
-def _refuse_length(name: str, column: Array, step: float, lines: Array | None) -> None:
+def _refuse_length(name: str, column: Array, step: float, lines: Array) -> None:
     """Refuse a step or a length that is among the first heights or the last, in whatever unit."""
     for k in (0, 1, 2, column.size - 1):
         number, others = column[k], column.size - (k + 1 if k < 3 else 1)
         for length in (step, others * step, (others - 1) * step):
             if any(abs(number * size / length - 1) < _SAME for size in LENGTH.units.values()):
-                where = f"point {k + 1}" if lines is None else f"line {lines[k]:.0f}"
                 raise InputError(
-                    f"{where} of {name} is {number:g}, and the step or the length of the trace is "
-                    f"{length_text(length, 6)}: remove it from the heights"
+                    f"line {lines[k]:.0f} of {name} is {number:g}, and the step or the length of "
+                    f"the trace is {length_text(length, 6)}: remove it from the heights"
                 )
 
 

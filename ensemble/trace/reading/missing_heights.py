@@ -78,7 +78,7 @@ def without_codes(heights: Array, *, known_alone: bool = False) -> tuple[Array, 
     shown = ", ".join(f"{value:.10g}" for value in values[codes][:4])
     return (
         np.where(np.isin(heights, values[codes]), np.nan, heights),
-        f"{counted(int(times[codes].sum()), 'height')} of {shown} taken as drop-outs",
+        f"{counted(int(times[codes].sum()), 'height')} of {shown}",
     )
 
 
@@ -103,14 +103,14 @@ def invalid_rows(
 ) -> tuple[Array, list[str]]:
     """Return which rows a column named "valid" marks with nought, and descriptions.
 
-    Other columns beside the chosen ones that hold two numbers alone are described, and those that
+    Other columns beside the chosen ones that hold few numbers alone are described, and those that
     rise or fall throughout.
     """
     marked = np.zeros(columns.shape[1], dtype=bool)
     notes = []
     for k, column in enumerate(columns):
         numbers = np.unique(column[np.isfinite(column)])
-        held = [f"{number:g}" for number in numbers[:3]]
+        held = [f"{number:g}" for number in numbers[: _MOST_CODES + 1]]
         held += ["empty fields"] * bool(len(held) == 1 and np.isnan(column).any())
         if k in chosen or len(held) < 2:
             continue
@@ -130,6 +130,6 @@ def invalid_rows(
             marked |= column <= 0
             count = counted(int((column <= 0).sum()), "height")
             notes.append(f"{count} marked {held[0]} in {name} taken as drop-outs")
-        elif has_two:
+        elif len(held) <= _MOST_CODES:
             notes.append(f"{name} holds {' and '.join(held)} alone: it is not used")
     return marked, notes

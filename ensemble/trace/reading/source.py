@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NoReturn
 
 from adhesis.ensemble.errors import InputError, reason
 from adhesis.ensemble.escape import printable
@@ -47,8 +47,8 @@ _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _INSTRUMENT_TEXT = re.compile(rb"[ab]ISO-1\.0|fileformat", re.IGNORECASE)
 # Those that no reader here knows.
 _OTHER_TEXTS = {
-    re.compile(rb"\s*ISO ?5436|(?s:.*)\nCX [AIM] "): "a profile in the form of ISO 5436-2 (SMD)",
-    re.compile(rb"[ab](ISO|BCR)\s*-\s*\d"): "a variant of SDF (ISO 25178-71)",
+    re.compile(rb"\s*ISO ?5436|(?s:.*)\nCX\s+[AIM]\s"): "a profile in the form of ISO 5436-2 (SMD)",
+    re.compile(rb"\s*[ab](ISO|BCR)[-\s]*\d"): "a variant of SDF (ISO 25178-71)",
     re.compile(rb"DSAA\s"): "a grid of Surfer (DSAA)",
     re.compile(rb"Zygo XYZ"): "a file of Zygo (XYZ), which counts pixels",
 }
@@ -136,7 +136,11 @@ class Source:
                 raise InputError(f"{self} is {what}: {mend}")
         return begin
 
-    def container(self) -> str | None:
+    def refuse(self, sentence: str) -> NoReturn:
+        """Raise InputError; a workbook or an archive is named as that."""
+        raise InputError(self._container() or f"{self} {sentence}") from None
+
+    def _container(self) -> str | None:
         """Return a message for a workbook or an archive that is no instrument's file, else None."""
         begin, suffix = self.beginning(), Path(self.name).suffix.lower()
         workbook = f"{self} is a workbook: save its columns as text (CSV)"
