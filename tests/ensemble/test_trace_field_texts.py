@@ -559,6 +559,7 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "a row of no map": ([UM, *TWO], {"row": 3}, "row is 3: .* is no map, as"),
     "two rows": ([UM, *TWO[:2]], "holds 2 rows of numbers"),
     "too few rows": ([UM, *TWO[:9]], "holds 9 rows of numbers: at least 32"),
+    "time stamps": ([f"{10**17 + k} {z}" for k, z in enumerate(ZS)], {"unit": "nm"}, "stand still"),
     "twice the same place": ([UM, TWO[0], *TWO], "positions stand still at line 3"),
     "an unknown unit": (TWO, {"unit": "furlong"}, "unit is 'furlong': it must be one of m"),
     "heights in mm, positions in µm": (TWO, {"unit": "um,mm"}, "in the same unit"),

@@ -125,9 +125,7 @@ def test_heights_without_lengths_are_not_asked_of_the_reader(tmp_path: Path) -> 
 
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["surface"] = np.outer(Z, Z)
-    with pytest.raises(
-        InputError, match=r"a\.h5 states no lengths or no unit .* give step and unit"
-    ):
+    with pytest.raises(InputError, match=r"a\.h5 states no lengths or no .* give step and unit"):
         read_trace(tmp_path / "a.h5")
 
 

@@ -113,7 +113,7 @@ def _step_of_rounded(x: Array, digit: float) -> float | None:
     Every position lies within half a digit of a grid of as many points, and the steps alternate in
     a way that this explains.
     """
-    steps = np.diff(x)
+    x, steps = x - x[0], np.diff(x)
     if np.any(steps < 0):
         return None
     middle = float(np.median(steps))
