@@ -306,11 +306,12 @@ def test_points_that_a_count_leaves_out_are_drop_outs(name, form, tmp_path):
     trace = read_trace(put(tmp_path / "t.csv", [f"{name},z (um)", *rows]), step=1e-6)
     assert np.flatnonzero(np.isnan(trace.heights)).tolist() == missing
     assert (trace.points, trace.step) == (N, 1e-6)
-    # Of positions one longer step is a row left out; a step of 1.0025 would explain it as well.
-    rows = [f"{form.format(k)},{z}" for k, z in enumerate(ZS) if k != 200]
-    trace = read_trace(put(tmp_path / "t.csv", [UM, *rows]))
-    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [200]
-    assert trace.step == pytest.approx(1e-6)
+    # Of positions longer steps are rows left out; a step of 1.0025 would explain one as well.
+    for step, left_out in (1.0, [200]), (1 / 3, missing):
+        rows = [f"{step * (17 + k):.9f},{z}" for k, z in enumerate(ZS) if k not in left_out]
+        trace = read_trace(put(tmp_path / "t.csv", [UM, *rows]))
+        assert np.flatnonzero(np.isnan(trace.heights)).tolist() == left_out
+        assert trace.step == pytest.approx(1e-6 * step)
 
 
 SMD = [

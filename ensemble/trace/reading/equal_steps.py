@@ -114,7 +114,7 @@ def _step_of_rounded(x: Array, digit: float) -> float | None:
     a way that this explains.
     """
     x, steps = x - x[0], np.diff(x)
-    if np.any(steps < 0):
+    if np.any(steps < 0) or np.ptp(steps) > 2.5 * digit:  # rounding makes it two digits at most
         return None
     middle = float(np.median(steps))
     if np.sum(np.abs(steps - middle) > max(digit / 2, _UNEVEN * middle)) < _IRREGULAR:
