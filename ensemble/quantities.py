@@ -152,6 +152,7 @@ _LENGTHS = (
     ("inch", 25.4e-3, "in inches zoll pouce pouces дюйм 英寸"),
     ("mil", 25.4e-6, "mils thou"),
     ("µin", 25.4e-9, "uin uinch µinch microinch microinches"),
+    ("kÅ", 1e-7, "kiloangstrom"),
 )
 LENGTH = Quantity(
     "length",

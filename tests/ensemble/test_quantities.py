@@ -29,7 +29,7 @@ from tests.support.campaign_support import campaign_text
 READ: list[tuple[Quantity, str, float]] = [
     *((LENGTH, "1e-6", 1e-6), (LENGTH, "0.5", 0.5), (LENGTH, "-1e-3", -1e-3)),
     *((LENGTH, "2.5um", 2.5e-6), (LENGTH, "7 µm", 7e-6), (LENGTH, "7μm", 7e-6)),
-    *((LENGTH, "3e2nm", 3e-7), (LENGTH, " .5 mm ", 5e-4), (LENGTH, "1 inch", 0.0254)),
+    *((LENGTH, "3e0kÅ", 3e-7), (LENGTH, " .5 mm ", 5e-4), (LENGTH, "1 inch", 0.0254)),
     *((STRESS, "20kPa", 2e4), (STRESS, "inf", inf), (WORK_OF_ADHESION, "20 mN / m", 0.02)),
     *((WORK_OF_ADHESION, "20mJ/m2", 0.02), (WORK_OF_ADHESION, "40J/m^2", 40.0)),
     # heights of a metre are asked about: below; what is no number is left to its rule
