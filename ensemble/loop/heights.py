@@ -71,7 +71,7 @@ def read_heights(
     if missing.size:
         where = f"on line {table.lines[missing[0]]}" if table else f"at index {missing[0]}"
         if codes:
-            where += f" (there are {codes}, which instruments write for missing ones)"
+            where += f" ({codes}, which instruments write for missing ones)"
         raise InputError(
             f"{path} has no finite height {where}: --heights needs every height of the period "
             "(adhesis trace fills gaps)"

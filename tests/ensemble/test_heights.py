@@ -156,12 +156,12 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, Any], str]] = {
     "a code": (
         [*NM[:5], "-9999", *NM[5:]],
         {"unit": "nm"},
-        "on line 6 .* 1 height of -9999, which instruments write for missing ones",
+        "on line 6 .1 height of -9999, which instruments write for missing ones",
     ),
     "two codes": (
         [*NM[:5], "-32768", *NM[5:9], "32767", *NM[9:]],
         {"unit": "nm"},
-        "are 2 heights of -32768, 32767, which instruments write for missing ones",
+        "line 6 .2 heights of -32768, 32767, which instruments write for missing ones",
     ),
 }
 
