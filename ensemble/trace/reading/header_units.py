@@ -220,6 +220,8 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> H
     ``fields`` are those of its lines that have as many fields as the data.
     """
     rows = [list(map(Column, row)) for row in fields]
+    # Beside other rows a label and its unit ("Z unit;um", "Rz;nm") name no columns.
+    rows = [r for r in rows if len(rows) == 1 or r[0].is_bare or r[0].has_unit or not r[-1].is_bare]
     found = [row for row in map(_row_of_units, rows, [None, *rows]) if row is not None]
     whole = {row.units for row in found if not row.unclear and None not in row.units}
     known: list[set[str]] = [set(), set()]
@@ -269,8 +271,6 @@ def _row_of_units(row: Sequence[Column], above: Sequence[Column] | None) -> Head
     if any(_VALUE.search(column.plain) for column in row) or not any(c.has_unit for c in row):
         return None
     bare = all(column.is_bare for column in row)
-    if not (bare or row[0].is_bare or row[0].has_unit) and row[-1].is_bare:
-        return None  # "Z unit;um", "Rz;nm": a label and its unit
     names = above if bare and above else row
     if len(row) == 1 and row[0].unit and names[0].words and not names[0].names(False):
         return None  # above heights alone, it is about positions
