@@ -370,7 +370,8 @@ class _Reader:
         is_comment = plain[:1] in COMMENT and not (is_missing(plain) and plain.strip("#"))
         if (plain and is_comment) or _FACTOR.fullmatch(line):
             return None
-        fields = [plain] if is_missing(plain) else split(line, self.delimiter)
+        parts = split(line, self.delimiter)
+        fields = [plain] if is_missing(plain) else parts
         while len(fields) > self.count and not fields[-1]:
             fields.pop()
         if not any(fields[:1]) and self.holds_names(place):
@@ -382,8 +383,7 @@ class _Reader:
         if len(fields) > self.count or len(numbers) < len(fields):
             return None
         lacking = self.count - len(fields)
-        is_whole = len(split(line, self.delimiter)) >= self.count
-        return _Row(fields + [""] * lacking, numbers + [nan] * lacking, is_whole)
+        return _Row(fields + [""] * lacking, numbers + [nan] * lacking, len(parts) >= self.count)
 
     def holds_row(self, place: int) -> bool:
         """Return whether a row holds a number, or a word for a missing one in its columns.
