@@ -365,9 +365,9 @@ def _warn_of_held(work: _Work, heights: Array, start: float) -> None:
     end = begin + float(counts[k] - 1) * work.trace.step
     work.warnings.append(
         f"{counts[k]} heights in a row from {length_text(begin)} on are equal "
-        f"({counts[held].sum()} in all), as hardly two elsewhere: they may be cut off at the "
-        "range of the instrument, stand for missing ones, or be held where nothing was measured; "
-        f"if so, leave them out, with NaN or by {excluding(begin, end)}"
+        f"({counts[held].sum()} in all), as hardly two elsewhere: if they are cut off at the range "
+        "of the instrument, measure with a larger one; if they stand for missing ones, or were "
+        f"held where nothing was measured, leave them out, with NaN or by {excluding(begin, end)}"
     )
 
 
