@@ -63,6 +63,7 @@ EDGE_SHARE = (TOUCH_SHARE / SMEARED) ** 0.25
 _JUMPS, _SAMPLES = 16, 6
 _MOST_OF_LOSS = 0.9
 _OF_GAP = 0.99  # of the mean gap at a turning point: nearer to full contact no jump is sought
+_OF_STEP = 1e-3  # of the load step: the shortest with which the end of a path is sought
 _SAME = 1e-9  # of the period: edges that differ by less have not moved
 
 
@@ -206,7 +207,8 @@ def turn_range(method: Method, record: Record, step: float, lost: float, longest
         for branch, after, state in zip(record.branches, following, record.states, strict=True)
         if (branch, after) == ("loading", "unloading")
     ]
-    return min(_way_beyond(method, state, step, TOUCH_SHARE * lost, longest) for state in turns)
+    least = min(_way_beyond(method, state, step, TOUCH_SHARE * lost, longest) for state in turns)
+    return least if least < longest else math.inf
 
 
 def _way_beyond(
@@ -214,28 +216,24 @@ def _way_beyond(
 ) -> float:
     """Return the way of :func:`turn_range` beyond one state; jumps take ``most`` there."""
     problem, turn = method.problem, state.separation
-    way, dropped = min(longest, _OF_GAP * turn), 0.0
-    x, end = problem.prescribed_in(state), turn - way
-    fixed = problem.control.is_fixed
+    x, farthest = problem.prescribed_in(state), min(longest, _OF_GAP * turn)
+    fixed, end, shortest = problem.control.is_fixed, turn - farthest, _OF_STEP * step
     # what is prescribed ends a path at fixed separations: that of a state may be off by rounding
     while (x if fixed else state.separation) > end:
-        x = max(x - step, end) if fixed else x - step
         try:
-            path = method.follow(state, x)
+            path = method.follow(state, max(x - step, end) if fixed else x - step)
         except PathError:
-            way = turn - state.separation
-            break
-        drops = np.cumsum([max(0.0, jump.energy_drop) for jump in path.jumps])
-        found = np.flatnonzero(dropped + drops > most)
-        if len(found):
-            way = turn - path.jumps[found[0]].separation
-            break
-        dropped += drops[-1] if len(drops) else 0.0
-        # under a load the separation falls ever more slowly, and without jumps there is far to go
-        if not (fixed and path.jumps):
-            step *= 2
-        state = path.states[-1]
-    return way if way < longest else math.inf
+            step /= 4
+            if step < shortest:
+                return turn - state.separation
+            continue
+        x = max(x - step, end) if fixed else x - step
+        for jump in path.jumps:
+            most -= max(0.0, jump.energy_drop)
+            if most < 0:
+                return turn - jump.separation
+        step, state = 2 * step, path.states[-1]  # under a load it falls ever more slowly
+    return farthest
 
 
 def least_range(*ranges: Any) -> NDArray[np.float64]:

@@ -342,16 +342,16 @@ def test_nothing_is_known_beyond_a_path_that_cannot_be_followed(monkeypatch):
     loop = run_loop(method, max_penetration=jump - 0.03, load_steps=20)
     assert loop.turn_range == math.inf
     h_max, follow = loop.problem.profile.h_max, type(method).follow
-    last = (1 - jump + 0.03) * h_max
+    way = 1e-3 * h_max  # 0.04 of a load step, found in shorter ones
 
     def stopped(self, state, separation):
-        if separation < last - 1e-12 * h_max:
+        if separation < (1 - jump + 0.03) * h_max - way:
             raise PathError("no state")
         return follow(self, state, separation)
 
     monkeypatch.setattr(type(method), "follow", stopped)
     loop = run_loop(method, max_penetration=jump - 0.03, load_steps=20)
-    assert loop.turn_range == 0.0
+    assert loop.turn_range == pytest.approx(way, rel=0.1)
 
 
 def test_full_contact_bounds_the_range_beyond_the_turn():
