@@ -144,7 +144,8 @@ def _interrupts(name: str) -> Iterator[None]:
     of its own for all but SIGINT.
 
     What a handler raises while a module is loaded may be lost, or come out as another error; there
-    the signal ends the process. What it raises in a finalizer is dropped; the signal comes again.
+    the signal ends the process. What it raises in a finalizer is dropped, and in h5py may come out
+    as that of a damaged file; the signal comes again.
     """
     received = 0
 
@@ -152,12 +153,13 @@ def _interrupts(name: str) -> Iterator[None]:
         nonlocal received
         received = number
         frames = [f for f, _ in walk_stack(frame)]
-        if any(f.f_code is dropped.__code__ for f in frames):  # where it would be dropped for good
+        packages = {str(f.f_globals.get("__name__")).partition(".")[0] for f in frames}
+        if "h5py" in packages or any(f.f_code is dropped.__code__ for f in frames):
             come_again()
             return
         if any(f.f_globals.get("__name__") == "importlib._bootstrap" for f in frames):
             files = sys.modules.get("adhesis.ensemble.files")
-            if files is not None:
+            if hasattr(files, "remove_unfinished"):  # it is not being loaded itself
                 files.remove_unfinished()
             signal.signal(number, signal.SIG_DFL)
             signal.raise_signal(number)

@@ -310,6 +310,8 @@ def _damage(path: Path) -> Iterator[None]:
     except PermissionError as error:
         raise InputError(f"{path} cannot be read: permission denied") from error
     except Exception as error:  # h5py raises nearly every kind over damaged bytes
+        if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C in Python, inside h5py
+            raise error.__cause__ from None
         if isinstance(error, OSError) and lack(error):
             raise  # too many open files, say: nothing is wrong with this one
         if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:

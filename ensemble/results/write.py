@@ -87,14 +87,11 @@ def opened(path: Path) -> Iterator[h5py.File]:
     Signals are held back while HDF5 opens and closes it: what a handler raises would be an error of
     the disk to HDF5. OSError also at the end, if something could not be written.
     """
-    with DiskFile(path, "x+b") as disk:
+    with DiskFile(path, "x+b") as disk, ExitStack() as closing:
         with signals_held():
             file = h5py.File(disk, "w")
-        try:
-            yield file
-        finally:
-            with signals_held():
-                file.close()
+            closing.callback(signals_held()(file.close))
+        yield file
 
 
 class Writer(AbstractContextManager["Writer"]):

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 
+import h5py
 import pytest
 
 from adhesis.ensemble.campaign.file import load_campaign
@@ -259,11 +260,19 @@ def test_a_signal_in_a_finalizer_ends_a_command(number, code, capsys, monkeypatc
     assert len(timers) > 1  # more where what it raised was dropped once more
 
 
-def test_watching_ends_with_ctrl_c(folder, capsys, monkeypatch):
-    def interrupt(seconds):
-        raise KeyboardInterrupt
+def test_watching_ends_with_ctrl_c_that_comes_inside_hdf5(folder, capsys, monkeypatch):
+    """There what a handler raises would come out as an error of the file."""
+    iterate, signals = h5py.h5ds.iterate, [signal.SIGINT]
 
-    monkeypatch.setattr("adhesis.ensemble.command.status.time.sleep", interrupt)
+    def interrupted(dataset, dim, function, start):
+        def take(scale):
+            if signals:
+                signal.raise_signal(signals.pop())
+            function(scale)
+
+        return iterate(dataset, dim, take, start)
+
+    monkeypatch.setattr(h5py.h5ds, "iterate", interrupted)
     assert main(["status", "r.h5", "--watch"]) == 130
     assert capsys.readouterr().err == "adhesis status: interrupted\n"
 
