@@ -203,8 +203,8 @@ def _group_line(group: dict[str, Any], further: Mapping[str, str]) -> str:
         loss *= 1e3
         shown = f"  {loss:.4g}" if error is None else f"  {with_error(loss, 1e3 * error)}"
     return (
-        f"{group['hurst']:5.4g}  {group['work_of_adhesion']:9.4g} "
-        + "".join(f"{group[name]:{len(heading)}.4g}  " for name, heading in further.items())
+        f"{group['hurst']:5.6g}  {group['work_of_adhesion']:9.6g} "
+        + "".join(f"{group[name]:{len(heading)}.6g}  " for name, heading in further.items())
         + f"{counts} "
         + (f"{mean:9.3g}" if mean is not None else " " * 9)
         + shown

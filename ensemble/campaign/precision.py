@@ -160,8 +160,9 @@ class Precision:
     def __str__(self) -> str:
         known = f"{self.quantity}: interval unknown"
         if np.isfinite(self.estimate.relative_error):
+            unit = " J/m²" if self.quantity == "loss" else ""
             known = (
-                f"{self.quantity} {self.estimate.low:.4g} to {self.estimate.high:.4g} "
+                f"{self.quantity} {self.estimate.low:.4g} to {self.estimate.high:.4g}{unit} "
                 f"(± {percent(self.estimate.relative_error, digits=3)})"
             )
         verdict = {True: "met", False: "not met", None: "not finished"}[self.met]

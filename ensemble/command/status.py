@@ -70,7 +70,7 @@ def _status(path: Path) -> dict[str, Any]:
 
 
 def _text(status: dict[str, Any], seconds: float = 0.0, finished: int = 0) -> str:
-    """Return the status as text, with a line on the run that writes, and how old the last row is.
+    """Return the status as text, with a line on the run that writes, and the age of the file.
 
     Rate and time left are those of the tasks that were ``finished`` in the last ``seconds``.
     """
@@ -83,5 +83,5 @@ def _text(status: dict[str, Any], seconds: float = 0.0, finished: int = 0) -> st
         rate = finished / seconds
         pace = f"; {3600 * rate:.3g} an hour, about {duration(status['pending'] / rate)} left"
     text = "no run is writing" if run is None else f"a run is writing ({described(run)})"
-    age = "" if last is None else f"; last row {duration(max(0.0, time.time() - last))} ago"
+    age = "" if last is None else f"; last written {duration(max(0.0, time.time() - last))} ago"
     return as_text(status, f"{pace}\n{text}{age}")

@@ -127,7 +127,7 @@ def turning_point(data: Aggregate) -> str:
     if cycle.turns_at_stress:
         what = "mean stress" if cycle.under_load else "preload"
         short = sum(cell.short_of_preload for cell in data.cells)
-        rest = f" ({short} of {data.done} loops turned before they reached it)" if short else ""
+        rest = f" ({short} of {counted(data.done, 'loop')} turned before that)" if short else ""
         ends = sorted({min(ends), max(ends)})
         return f"a {what} of {in_one_unit('mean_stress', ends, ' … ')}{rest}"
     return f"{state_sign(data)} = {from_to(ends, between=' … ')}"
@@ -164,8 +164,8 @@ def _numerical(data: Aggregate) -> str:
     elsewhere = "no jump would have ended elsewhere by other speeds, order or a finer field"
     if raced := int(np.sum(races > 0)):
         elsewhere = (
-            f"in {raced} of {loss.size} loops other speeds, order or a finer field might end "
-            f"a jump elsewhere (at most {most('energy_at_stake')} of a loop's loss at stake)"
+            f"in {raced} of {counted(loss.size, 'loop')} other speeds, order or a finer field "
+            f"might end a jump elsewhere (at most {most('energy_at_stake')} of a loss at stake)"
         )
     return (
         f"The estimated numerical error of a loss is at most {most('loss_error')} of it; the "
@@ -307,8 +307,8 @@ def _preload(data: Aggregate) -> str:
             highest = highest_stress(results.column("loading_mean_stress", rows))
             listing.append(f"{rows.size} at {cell.name} ({most_reached(highest)})")
     return (
-        f"WARNING: {sum(cell.short_of_preload for cell in short)} of {data.done} loops did not "
-        f"reach their preload, and turned at the latest turning point: {_listed(listing)}. "
+        f"WARNING: {sum(cell.short_of_preload for cell in short)} of {counted(data.done, 'loop')} "
+        f"did not reach the preload, and turned at the latest turning point: {_listed(listing)}. "
         f"{INSTEAD}."
     )
 

@@ -113,7 +113,7 @@ def below(cells: Sequence[Cell], others: Sequence[tuple[str, float]]) -> str:
     if lost:
         parts.append(f"{lost} of {counted(done + lost, 'loop')} failed, and are in no mean")
     if short := sum(cell.short_of_preload for cell in drawn):
-        parts.append(f"{short} of {counted(done, 'loop')} did not reach their preload")
+        parts.append(f"{short} of {counted(done, 'loop')} did not reach the preload")
     return "\n".join(parts)
 
 

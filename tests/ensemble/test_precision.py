@@ -86,8 +86,8 @@ def test_a_cell_is_described_with_quantity_both_ends_and_verdict():
         assert known.met is {"met": True, "not finished": None}.get(verdict, False)
         error = f"{100 * known.estimate.relative_error:.3g}"
         assert str(known) == (
-            f"loss {known.estimate.low:.4g} to {known.estimate.high:.4g} (± {error} %) of {count} "
-            f"realisations, wanted ± {100 * wanted:g} %: {verdict}"
+            f"loss {known.estimate.low:.4g} to {known.estimate.high:.4g} J/m² (± {error} %) "
+            f"of {count} realisations, wanted ± {100 * wanted:g} %: {verdict}"
         )
     unknown = precision([np.nan, 1.0], 0.05, "loss")
     assert str(unknown).startswith("loss: interval unknown of 1 realisation, wanted ± 5 %: not met")

@@ -236,7 +236,7 @@ def test_loops_short_of_their_preload_are_counted_below_the_figures(tmp_path):
     results = adhesis.Campaign(text).run(tmp_path / "c.h5")
     figure = results.plot.loss_along("preload")
     below = figure.get_supxlabel().splitlines()
-    assert below == ["2 of 2 loops did not reach their preload", "n = 1 profile"]
+    assert below == ["2 of 2 loops did not reach the preload", "n = 1 profile"]
     assert [text.get_text() for text in figure.legends[0].get_texts()][-1] == SHORT
     assert [len(hollow(axes)) for axes in figure.axes] == [2] * 5
     said = " ".join(findings.agreement(results.averages))
@@ -284,7 +284,7 @@ def test_a_campaign_says_which_loops_did_not_reach_their_preload(tmp_path, capsy
     with pytest.warns(UserWarning, match="^1 loop did not reach the preload$"):
         adhesis.Campaign(file).run(out, progress=False)
     (sentence,) = (s for s in findings.quality(aggregate(out)) if "did not reach" in s)
-    assert "WARNING: 1 of 2 loops did not reach their preload, and turned at the latest" in sentence
+    assert "WARNING: 1 of 2 loops did not reach the preload, and turned at the latest" in sentence
     with adhesis.open(out) as results:
         highest = 1e-3 * results.dataset.loading_mean_stress.max().item()
     reached = f"(at load steps the mean stress is at most {highest:.3g} kPa)"
@@ -299,7 +299,7 @@ def test_a_campaign_says_which_loops_did_not_reach_their_preload(tmp_path, capsy
     assert [row.split(",")[place] for row in table[1:]] == ["0", "1"]
     text = (page / "report.md").read_text()
     assert " | short | " in text
-    turn = "0.0001 … 1 MPa (1 of 2 loops turned before they reached it)"
+    turn = "0.0001 … 1 MPa (1 of 2 loops turned before that)"
     assert text.split("\n\n")[1].startswith(f"A loop to a preload of {turn} and back until")
     steps = "in steps of which 10 would lead to Δ/h_max = 0.999 and unloaded"
     assert f" Each loop was loaded to a preload of {turn} {steps} until detached; " in text

@@ -598,7 +598,7 @@ def test_the_page_begins_with_what_came_out_and_how_well_it_is_known(data, repor
     assert f"closes within {100 * audit:.2g} %" in numerical
     raced = sum(int((cell.values["races"] > 0).sum()) for cell in data.cells)
     assert f"in {raced} of 30 loops other speeds, order or a finer field" in numerical
-    assert "at most 2 % of a loop's loss" in numerical
+    assert "at most 2 % of a loss" in numerical
     head = (report / "report.md").read_text(encoding="utf-8").split("\n\n")[1]
     assert head == " ".join(findings.verdict(data))
 

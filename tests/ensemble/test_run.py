@@ -344,7 +344,7 @@ def test_two_runs_on_one_file(tmp_path):
     first.communicate(timeout=150)
     assert first.returncode == 75
     ended = adhesis_here("status", out).stdout
-    assert "no run is writing; last row " in ended
+    assert "no run is writing; last written " in ended
     assert json.loads(adhesis_here("status", out, "--json").stdout)["run"] is None
 
 
