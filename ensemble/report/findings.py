@@ -69,7 +69,9 @@ def _outcome(data: Aggregate) -> str:
         what = "the drops before the fall are lost"
     if len(cells) == 1:
         return f"{top} on average {_loss(cells[0])}{friction}."
-    share = [100 * cell.estimates["small_scale_share"].mean for cell in cells]
+    scales = ("loss_small_scale", "loss_large_scale")
+    drops = [[cell.estimates[name].mean for name in scales] for cell in cells]
+    share = [100 * small / (small + large or 1.0) for small, large in drops]
     return (
         f"{top}, on average over realisations, from {_loss(cells[0])} to {_loss(cells[-1])}; "
         f"{from_to(share, '{:.0f}'.format)} % of {what} where edges run inside patches{friction}."

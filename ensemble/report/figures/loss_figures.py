@@ -152,10 +152,10 @@ def loss_by_mechanism(data: Aggregate) -> style.PublishedFigure:
         bottom = bottom + mean
     above = 1e3 * np.nan_to_num([found.high - found.mean for found in small])
     reach = np.fmax(bottom + above, 1e3 * np.array([found.high for found in large]))
-    for x, cell, top in zip(place, cells, reach, strict=True):
-        share = f"{100 * cell.estimates['small_scale_share'].mean:.0f} %"
+    shares = mean / np.where(bottom > 0, bottom, 1.0)
+    for x, share, top in zip(place, shares, reach, strict=True):
         place_of_text: Any = {"textcoords": "offset points", "ha": "center", "fontsize": 6}
-        axes.annotate(share, (x, top), (0, 3), **place_of_text)
+        axes.annotate(f"{100 * share:.0f} %", (x, top), (0, 3), **place_of_text)
     unit, size = common_unit("work_of_adhesion", data.works_of_adhesion)
     texts = [f"{cell.hurst:g}\n{cell.work_of_adhesion / size:g}" for cell in cells]
     axes.set_xticks(place, texts)

@@ -465,12 +465,10 @@ def mechanisms(data: Aggregate) -> Table:
     """
     columns = [
         *map(axis_column, data.campaign.axes),
-        *estimated("small_scale_share", "value ci_low ci_high", "small-scale share", percent),
+        *estimated("small_scale_share", "value ci_low ci_high", "small scale a loop", percent),
         *estimated("jump_count", "value", "jumps a loop", number(3)),
-        *estimated("pull_off_stress", "value", "largest tension (kPa)", number(3, unit=1e3)),
-        TableColumn(
-            *("pull_off_stress_sem", "estimates.pull_off_stress.sem", "s.e. (kPa)"),
-            number(2, unit=1e3),
+        *estimated(
+            *("pull_off_stress", "value sem", "largest tension (kPa)", number(3, 1e3)), size=1e3
         ),
         *estimated("pull_off_penetration", "value", "detached by Δ/h_max", number(3)),
         *estimated("wall_time", "value", "s a loop", lambda s: f"{float(f'{s:.3g}'):g}"),
