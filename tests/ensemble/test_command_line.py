@@ -186,15 +186,15 @@ def test_what_nohup_ignores_does_not_end_a_command(folder, monkeypatch):
         signal.signal(signal.SIGHUP, before)
 
 
+FINDER = "import os, sys\nclass Finder:\n    def find_spec(name, *_):\n        "
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize("module", ["adhesis.ensemble.command.main", "numpy"])
 def test_a_signal_while_modules_are_loaded_ends_the_process_as_itself(module, number):
     """What a handler raises there may be lost, or come out as an ImportError."""
     code = (
-        "import os, sys\n"
-        "class Finder:\n"
-        "    def find_spec(name, *_):\n"
-        f"        if name == {module!r}: os.kill(os.getpid(), {int(number)})\n"
+        f"{FINDER}if name == {module!r}: os.kill(os.getpid(), {int(number)})\n"
         "from adhesis.__main__ import main\n"
         "sys.meta_path.insert(0, Finder)\n"
         "sys.argv[1:] = ['status', 'none.h5']\n"
@@ -207,14 +207,11 @@ def test_a_signal_while_modules_are_loaded_ends_the_process_as_itself(module, nu
 def test_a_signal_while_modules_are_loaded_leaves_no_part_of_an_output(tmp_path):
     """Figures load modules while a report is written."""
     code = (
-        "import os, sys\n"
+        f"{FINDER}os.kill(os.getpid(), {int(signal.SIGTERM)})\n"
         "from pathlib import Path\n"
         "from adhesis.ensemble.command import status\n"
         "from adhesis.ensemble.command.main import main\n"
         "from adhesis.ensemble.files import staged_folder, whole_file\n"
-        "class Finder:\n"
-        "    def find_spec(name, *_):\n"
-        f"        os.kill(os.getpid(), {int(signal.SIGTERM)})\n"
         "def execute(args):\n"
         "    with staged_folder(Path('.')) as staging, whole_file(Path('a.txt')):\n"
         "        (staging / 'figure.png').touch()\n"
@@ -279,33 +276,25 @@ def test_watching_ends_with_ctrl_c_that_comes_inside_hdf5(folder, capsys, monkey
 
 def process(*words, before="", **options) -> subprocess.CompletedProcess[str]:
     """Run a command in a process of its own, by a shell where something stands before it."""
-    command = [sys.executable, "-m", "adhesis", *words]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
-    if before:
-        command = ["sh", "-c", f'"$@" {before}', "sh", *command]
-    return subprocess.run(command, text=True, env=pipes.pop("env", environment()), **pipes)
+    shell = ["sh", "-c", f'"$@" {before}', "sh"] if before else []
+    command = [*shell, sys.executable, "-m", "adhesis", *words]
+    return ran(*command, **({"env": environment()} | options))
 
 
-FULL = "adhesis{}: stdout could not be written: No space left on device\n"
-
-
-def test_a_full_device_is_one_sentence(folder):
+def test_a_full_device_or_a_closed_stdout_is_one_sentence(folder):
     with open("/dev/full", "w") as full:
-        for words, name in ((["--help"], ""), (["status", "r.h5"], " status")):
-            done = process(*words, stdout=full)
-            assert (done.returncode, done.stderr) == (74, FULL.format(name))
+        done = process("--help", stdout=full), process("status", "r.h5", stdout=full)
+    full, closed = "No space left on device", "Bad file descriptor"
+    cases = (("", full), (" status", full), ("", closed))
+    for ended, (name, why) in zip((*done, process("--help", before=">&-")), cases, strict=True):
+        sentence = f"adhesis{name}: stdout could not be written: {why}\n"
+        assert (ended.returncode, ended.stderr) == (74, sentence)
 
 
 def test_messages_that_cannot_be_written_change_nothing(folder):
     with open("/dev/full", "w") as full:
         assert process("status", "--speed", stderr=full).returncode == 2
     assert process("status", "--speed", before="2>&-").returncode == 2
-
-
-def test_a_closed_stdout_is_one_sentence():
-    done = process("--version", before=">&-")
-    assert done.returncode == 74
-    assert done.stderr == "adhesis: stdout could not be written: Bad file descriptor\n"
 
 
 def test_a_setting_of_windows_does_not_reach_figures(tmp_path):

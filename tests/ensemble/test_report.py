@@ -586,10 +586,9 @@ def test_the_page_begins_with_what_came_out_and_how_well_it_is_known(data, repor
     means = [1e3 * cell.estimates["loss"].mean for cell in data.cells]
     assert f"from {min(means):.3g} mJ/m²" in outcome
     assert f"to {max(means):.3g} mJ/m²" in outcome
-    scales = ("loss_small_scale", "loss_large_scale")
-    drops = [[cell.values[name].sum() for name in scales] for cell in data.cells]
-    share = [100 * small / (small + large) for small, large in drops]
-    assert f"; {min(share):.0f} to {max(share):.0f} % of it is lost" in outcome
+    scales = [[c.values[f"loss_{of}_scale"].sum() for c in data.cells] for of in ("small", "large")]
+    share = 100 * np.array(scales[0]) / np.sum(scales, axis=0)
+    assert f"; {share.min():.0f} to {share.max():.0f} % of it is lost" in outcome
     errors = [
         max(e.high - e.mean, e.mean - e.low) / e.mean
         for e in (cell.estimates["loss"] for cell in data.cells)

@@ -7,7 +7,7 @@ from typing import Any
 
 def ran(*words: object, **options: Any) -> subprocess.CompletedProcess[str]:
     """Run a program to its end; its exit code is for the caller to judge."""
-    given = {"capture_output": True, "text": True, "timeout": 150, "check": False}
+    given = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "timeout": 150}
     return subprocess.run([str(word) for word in words], **given | options)
 
 
