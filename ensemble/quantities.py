@@ -235,8 +235,7 @@ def read_list(
         raise InputError(f"{option} {error}") from None
     except ValueError:
         raise InputError(f"{option} is {given}: it must be {rule}") from None
-    *others, last = [isinstance(number, Written) for number in numbers if number] or [False]
-    if last and others and not any(others):
+    if len({isinstance(number, Written) for number in numbers if number}) > 1:
         raise InputError(f"{option} is {given}: give each of the numbers its unit")
     return numbers
 

@@ -98,10 +98,10 @@ def tasks_of(campaign: Campaign, part: Part) -> Tasks:
     tasks = campaign.tasks(part)
     if part != WHOLE and campaign.stop.relative_error is not None:
         rule = "its batches are decided on whole cells"
-        raise InputError(f"part is {part}, but the campaign has [stop]: {rule}")
+        raise InputError(f"{parameter('part')} is {part}, but the campaign has [stop]: {rule}")
     if not tasks:
         count = counted(campaign.task_count, "task")
-        raise InputError(f"part is {part}: the campaign has {count} and so at most as many parts")
+        raise InputError(f"{parameter('part')} is {part}: of {count} in all this part has none")
     return tasks
 
 
@@ -198,8 +198,9 @@ def _growth(path: Path, old: Results, campaign: Campaign, part: Part) -> tuple[s
     """Return the keys by which a file has to grow; InputError where it cannot be the campaign's."""
     grown_keys = growth(path, old.campaign, campaign)
     if old.part != part:
-        held = "the whole campaign" if old.part == WHOLE else f"part {old.part} of it"
-        raise InputError(f"{path} holds {held}, and part {part} is wanted")
+        both = (old.part, part)
+        held, wanted = ("the whole campaign" if of == WHOLE else f"part {of} of it" for of in both)
+        raise InputError(f"{path} holds {held}, and {wanted} is wanted")
     if grown_keys and part != WHOLE:
         raise InputError(
             f"{path} holds part {part} of a smaller campaign: a part does not grow, what the "

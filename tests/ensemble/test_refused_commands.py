@@ -46,7 +46,7 @@ run c.toml --max-failures {{x,-1,nan,1e99,inf}} -> --max-failures is '{{}}'
 run c.toml --patience {{x,-1,nan,1e99,inf}} -> --patience is '{{}}'
 run c.toml --out p.h5 --part {{x,0/3,4/3,1/0}} -> --part is '{{}}': it must be K/N
 run c.toml --part 1/2 -> --part needs --out
-run c.toml {{--patience=0,--dry-run}} --out p.h5 --part 9/9 -> the campaign has 8 tasks and so at
+run c.toml {{--patience=0,--dry-run}} --out p.h5 --part 9/9 -> --part is 9/9: of 8 tasks in all
 run stop.toml {{--patience=0,--dry-run}} --out p.h5 --part 1/2 -> its batches are decided on whole
 run c.toml --redo some -> --redo is 'some'
 run c.toml --dry-run --redo all -> --redo and --dry-run cannot be given together
@@ -113,7 +113,7 @@ LOOP --max-penetration {{0\,5,0\,3\,0\,6}} ->
 LOOP --stiffness 0 -> needs --max-stress
 LOOP --stiffness 0 --max-stress 2,5kPa ->
     as in 2.5kPa; if two are meant, write 2.0kPa,5.0kPa
-LOOP --preload 0.5,1kPa -> --preload is '0.5,1kPa': give each of the numbers its unit
+LOOP --preload 2kPa,4 -> --preload is '2kPa,4': give each of the numbers its unit
 LOOP --hurst 0,8 -> --hurst is '0,8': it must be a number, as in 0.5
 LOOP --max-stress 20kPa -> a weight or a machine? For a weight give --stiffness 0 with
 LOOP --max-stress 20kPa --stiffness 1e9 -> give --preload 20kPa instead
@@ -122,7 +122,7 @@ LOOP --preload 20kPa --max-stress 1 -> --max-stress and --preload are given
 LOOP --preload 20kPa --max-penetration 0.5,0.6 -> beside --preload: it must be one
 LOOP --preload 20bar -> --preload is '20bar': its unit must be one of Pa, kPa
 LOOP --stiffness 0 --max-stress 0.2kPa,5bar -> --max-stress is '5bar': its unit must be one of Pa
-LOOP --preload 20kPa,2e4 -> --preload is 20kPa,2e4: turning points must differ
+LOOP --preload 20kPa,20000Pa -> --preload is 20kPa,20000Pa: turning points must differ
 # outputs of a loop
 LOOP --figure loop.bmp -> --figure is loop.bmp: the name must end in .png
 LOOP --film a.avi -> --film is a.avi: the name must end in .html, .gif or .mp4
