@@ -158,7 +158,7 @@ def _interrupts(name: str) -> Iterator[None]:
             come_again()
             return
         if any(f.f_globals.get("__name__") == "importlib._bootstrap" for f in frames):
-            files = sys.modules.get("adhesis.ensemble.files")
+            files: Any = sys.modules.get("adhesis.ensemble.files")
             if hasattr(files, "remove_unfinished"):  # it is not being loaded itself
                 files.remove_unfinished()
             signal.signal(number, signal.SIG_DFL)

@@ -69,8 +69,7 @@ def _outcome(data: Aggregate) -> str:
         what = "the drops before the fall are lost"
     if len(cells) == 1:
         return f"{top} on average {_loss(cells[0])}{friction}."
-    scales = ("loss_small_scale", "loss_large_scale")
-    drops = [[cell.estimates[name].mean for name in scales] for cell in cells]
+    drops = [[c.estimates[f"loss_{of}_scale"].mean for of in ("small", "large")] for c in cells]
     share = [100 * small / (small + large or 1.0) for small, large in drops]
     return (
         f"{top}, on average over realisations, from {_loss(cells[0])} to {_loss(cells[-1])}; "

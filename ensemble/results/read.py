@@ -34,6 +34,7 @@ _OF_HDF5 = frozenset(("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "DIME
 _SCALE_ROUNDING = 1e-12
 _LOOKS = 4
 _MOST_NAMED = 10
+_OF_THE_PATH = (errno.EACCES, errno.EPERM, errno.ENAMETOOLONG)
 _INSTEAD = "restore it from a copy, or compute the campaign again into another file"
 
 
@@ -307,14 +308,12 @@ def _damage(path: Path) -> Iterator[None]:
         raise
     except FileNotFoundError as error:
         raise InputError(f"{path} does not exist") from error
-    except PermissionError as error:
-        raise InputError(f"{path} cannot be read: permission denied") from error
     except Exception as error:  # h5py raises nearly every kind over damaged bytes
         if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C in Python, inside h5py
             raise error.__cause__ from None
         if isinstance(error, OSError) and lack(error):
             raise  # too many open files, say: nothing is wrong with this one
-        if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
+        if isinstance(error, OSError) and error.errno in _OF_THE_PATH:
             raise InputError(f"{path} cannot be read: {os.strerror(error.errno)}") from error
         raise InputError(
             f"{path} is not a results file of adhesis, or it is damaged or truncated"
