@@ -23,8 +23,10 @@ DEFAULT_LOAD_STEPS = 40
 """Load steps of a loop, unless they are given."""
 
 
-def check_cycle(turning_point: float, load_steps: int, control: Control) -> tuple[float, int]:
-    """Check a cycle; return its turning point and load steps as float and int.
+def check_cycle(
+    turning_point: float, load_steps: int, control: Control, name: str = ""
+) -> tuple[float, int]:
+    """Check a cycle; return turning point (``name`` in errors) and load steps as float and int.
 
     Raises
     ------
@@ -34,12 +36,12 @@ def check_cycle(turning_point: float, load_steps: int, control: Control) -> tupl
     TypeError
         If one of them is not a number.
     """
-    name, bounds = "max_penetration", FAR_DISPLACEMENT
+    own, bounds = "max_penetration", FAR_DISPLACEMENT
     if control.is_fixed:
         bounds = MAX_PENETRATION
     elif control.is_load:
-        name, bounds = "max_stress", MAX_STRESS
-    return real(name, turning_point, bounds), whole("load_steps", load_steps, LOAD_STEPS)
+        own, bounds = "max_stress", MAX_STRESS
+    return real(name or own, turning_point, bounds), whole("load_steps", load_steps, LOAD_STEPS)
 
 
 def turning_of(control: Control, max_penetration: T | None, max_stress: T | None) -> T:

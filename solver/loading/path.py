@@ -242,7 +242,7 @@ def check_path(
         raise ValueError(
             f"the path ends with unloading to {points[-1]} and goes out: omit that turning point"
         )
-    check_cycle(max(points), load_steps, problem.control)
+    check_cycle(max(points), load_steps, problem.control, "turning_points")
     return points
 
 

@@ -306,7 +306,7 @@ path([0.5, np.nan, 0.6]) ->
 path([0.3, 0.5]) -> ValueError: the path goes from 0.3 to 0.5: after loading it must unload
 path([0.5, 0.3, 0.2]) -> ValueError: after unloading it must load
 path([0.5, 0.3]) -> ValueError: omit that turning point
-path([1.2]) -> ValueError: max_penetration is 1.2
+path([1.2]) -> ValueError: turning_points is 1.2
 path([-0.3]) -> ValueError: the path starts with -0.3: it must start with loading
 path([0.5], out='no') -> TypeError: out is 'no': it must be True or False
 loop(preload=20.0, max_stress=20.0) -> ValueError: preload and max_stress are given
