@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.cells import Cell, alike, difference, doubtful_loops, precisions
 from adhesis.ensemble.campaign.tables import Axis
-from adhesis.ensemble.campaign.tasks import name_at, place
+from adhesis.ensemble.campaign.tasks import name_at
 from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.further_axes import (
@@ -39,6 +39,7 @@ from adhesis.solver.loading.zero_range import ANY_RANGE
 from adhesis.solver.method import BRANCHES
 
 _MOST_LISTED = 4
+_NOT_MONOTONE = "is not monotone"
 _STRESS_AND_AREA = ("mean_stress_dimensionless", "contact_fraction")
 
 
@@ -366,11 +367,7 @@ def _growth(data: Aggregate, of_paper: bool) -> Iterator[str]:
             f"interval{same}."
         )
         return
-    down = []
-    for pair in rest:
-        low, high = gamma_text(pair.lower.work_of_adhesion), gamma_text(pair.upper.work_of_adhesion)
-        at = f", {place(pair.lower.others)}" if pair.lower.others else ""
-        down.append(f"H = {pair.lower.hurst:g}, γ = {low} to {high}{at}")
+    down = [f"{pair.lower.name} to γ = {gamma_text(pair.upper.work_of_adhesion)}" for pair in rest]
     up = sum(pair.loss.difference.mean > 0 for pair in data.paired)
     yield (
         f"The mean loss in J/m² grows with γ in {up} of {len(data.paired)} steps of γ; not "
@@ -387,35 +384,37 @@ def _along(data: Aggregate, axis: Axis) -> Iterator[str]:
     if not lines:
         return
     moving = together(data, axis)
-    short, steps = [], []
+    short, trends = [], []
     for line in lines:
         if any(cell.short_of_preload for cell in line):
             alike = [other for other in line[0].others if other[0] not in moving]
             short.append(name_at(line[0].hurst, line[0].work_of_adhesion, alike))
         else:
-            steps.append(np.diff([cell.estimates["loss"].mean for cell in line]))
+            trends.append(_trend(line))
     low, high = (in_one_unit(axis.name, [end]) for end in (min(axis.values), max(axis.values)))
     along = f"Along {axis.name} from {low} to {high}"
-    if not steps:
+    if not trends:
         yield (
             f"{along} no trend is given: in every series of cells that are else alike, loops did "
             "not reach their preload."
         )
         return
-    known = ("grows", "falls", "stays the same", "is not monotone")
-    verbs = Counter(_verb(step, *known) for step in steps)
-    parts = [f"{verb} in {verbs[verb]}" for verb in known if verbs[verb]]
+    parts = [f"{trend} in {count}" for trend, count in Counter(trends).most_common()]
     rest = f"; not counted, as loops did not reach their preload: {_listed(short)}" if short else ""
     yield (
-        f"{along} the mean loss in J/m² {', '.join(parts)} of {len(steps)} series of cells that "
+        f"{along} the mean loss in J/m² {', '.join(parts)} of {len(trends)} series of cells that "
         f"are else alike{rest}."
     )
 
 
-def _verb(steps: NDArray[np.float64], up: str, down: str, flat: str, other: str) -> str:
-    """Return how values behave, from their differences."""
-    signs = tuple(np.unique(np.sign(steps)).tolist())
-    return {(1.0,): up, (-1.0,): down, (0.0,): flat}.get(signs, other)
+def _trend(cells: Sequence[Cell], loss: str = "loss") -> str:
+    """Return how a mean loss behaves; steps within the loops' numerical errors are none."""
+    names = (loss, loss.replace("loss", "loss_error"))
+    means, errors = (np.array([c.estimates[name].mean for c in cells]) for name in names)
+    steps = np.diff(means)
+    signs = np.unique(np.sign(steps)[np.abs(steps) > errors[1:] + errors[:-1]])
+    known = {(1.0,): "grows", (-1.0,): "falls", (): "stays the same"}
+    return known.get(tuple(signs.tolist()), _NOT_MONOTONE)
 
 
 def _order_in_slope(data: Aggregate, of_paper: bool) -> Iterator[str]:
@@ -428,9 +427,8 @@ def _order_in_slope(data: Aggregate, of_paper: bool) -> Iterator[str]:
         cells = [c for c in data.cells if c.work_of_adhesion == gamma and c.done > 1]
         if len(cells) > 2:
             cells.sort(key=lambda c: c.estimates["m2"].mean)
-            steps = np.diff([c.estimates[quantity].mean for c in cells])
-            neither = "is not monotone in m2"
-            verb = _verb(steps, "grows with m2", "falls with m2", neither, neither)
+            trend = _trend(cells, quantity)
+            verb = f"{trend} {'in' if trend == _NOT_MONOTONE else 'with'} m2"
             found.setdefault(verb, []).append(gamma_text(gamma))
     parts = [f"{verb} at γ = {_listed(gammas, ', ')}" for verb, gammas in found.items()]
     rest = "; the paper's table is not monotone" if of_paper else ""

@@ -44,7 +44,7 @@ def test_the_loop_of_a_machine_turns_at_the_preload(tmp_path):
     stress = np.array(document["mean_stress"])[np.array(document["branch"]) == "loading"]
     assert stress.max() == stress[-1]
     table = ("--csv", str(tmp_path / "loop.csv"))
-    several, *_ = rough_loop(tmp_path, "--preload", "0.5kPa,200", *table)
+    several, *_ = rough_loop(tmp_path, "--preload", "0.5kPa,200Pa", *table)
     assert [turn["preload"] for turn in several["turns"]] == [200.0, 500.0]
     assert "preload (Pa)" in (tmp_path / "loop.csv").read_text().splitlines()[0]
     assert several["loss"] == pytest.approx(document["loss"], rel=1e-5)

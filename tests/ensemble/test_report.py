@@ -446,13 +446,14 @@ def test_one_finished_task_of_one_cell_is_enough(tmp_path, quick_figures):
 
 @pytest.mark.parametrize(
     ("losses", "verb"),
-    [((1, 2, 3), "grows with"), ((3, 2, 1), "falls with"), ((1, 3, 2), "is not monotone in")],
+    [((1, 2, 1.9), "grows with"), ((3, 2, 1), "falls with"), ((1, 3, 2), "is not monotone in")],
 )
 def test_the_order_of_the_losses_in_m2_is_reported_as_one_through_hurst(losses, verb):
     cells = []
     for k, loss in enumerate(losses):
-        means = {"m2": SimpleNamespace(mean=1e-3 * (k + 1)), "loss": SimpleNamespace(mean=loss)}
-        cells.append(SimpleNamespace(work_of_adhesion=0.04, done=9, estimates=means))
+        means = {"m2": 1e-3 * (k + 1), "loss": loss, "loss_error": 0.1}
+        estimates = {name: SimpleNamespace(mean=mean) for name, mean in means.items()}
+        cells.append(SimpleNamespace(work_of_adhesion=0.04, done=9, estimates=estimates))
     data = SimpleNamespace(works_of_adhesion=(0.04,), cells=cells)
     (sentence,) = findings._order_in_slope(data, of_paper=False)
     assert sentence == f"Through H, the mean loss in J/m² {verb} m2 at γ = 0.04 J/m²."
