@@ -98,7 +98,7 @@ def test_keys_of_a_campaign_take_quantities_with_units() -> None:
 
 def test_turning_points_under_a_load_are_stresses_with_units() -> None:
     parser = parser_of("loop")
-    args = parser.parse(["--stiffness", "0", "--max-stress", "0.2kPa,500, 1e-3MPa"])
+    args = parser.parse(["--stiffness", "0", "--max-stress", "0.2kPa,500Pa, 1e-3MPa"])
     assert turns_of(args, Control(0.0))["turning_points"] == (200.0, 500.0, 1000.0)
 
 
