@@ -152,7 +152,7 @@ def prepare(
         lay_out()
     else:
         with Results(path) as old:
-            if _growth(path, old, campaign, part):  # which rows are not needed is decided anew
+            if grown_by(path, old, campaign, part):  # which rows are not needed is decided anew
                 taken = np.isin(old.status(), (schema.DONE, schema.FAILED))
                 source = Source(old, campaign, taken)
                 lay_out([source], created=old.attributes.get("created"))
@@ -194,7 +194,7 @@ def prepare(
     return plan
 
 
-def _growth(path: Path, old: Results, campaign: Campaign, part: Part) -> tuple[str, ...]:
+def grown_by(path: Path, old: Results, campaign: Campaign, part: Part) -> tuple[str, ...]:
     """Return the keys by which a file has to grow; InputError where it cannot be the campaign's."""
     grown_keys = growth(path, old.campaign, campaign)
     if old.part != part:

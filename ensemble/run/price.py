@@ -15,14 +15,14 @@ from pathlib import Path
 import numpy as np
 
 from adhesis.ensemble.campaign.precision import fewest, looks
-from adhesis.ensemble.campaign.tables import Campaign, growth
+from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.quantities import bytes_text, duration, percent
 from adhesis.ensemble.results.layout import rows_in
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
 from adhesis.ensemble.run.launch import peak_bytes
-from adhesis.ensemble.run.plan import prior, tasks_of
+from adhesis.ensemble.run.plan import grown_by, prior, tasks_of
 from adhesis.ensemble.task.compute import Runner
 from adhesis.ensemble.task.doubt import INSTEAD, highest_stress, most_reached
 from adhesis.ensemble.task.row import Row
@@ -154,7 +154,7 @@ def price(
     known: Known = {task.cell: [] for task in tasks.of_cells()}
     left, done = tasks, 0
     if path is not None and os.path.exists(path):
-        left, done = _left(campaign, path, tasks, known)
+        left, done = _left(campaign, path, part, tasks, known)
     for task in left.of_cells():
         check(campaign, task)
     # Of the cells that are not known yet, realisation by realisation
@@ -200,12 +200,14 @@ def price(
     )
 
 
-def _left(campaign: Campaign, path: Path, tasks: Tasks, known: Known) -> tuple[Tasks, int]:
+def _left(
+    campaign: Campaign, path: Path, part: Part, tasks: Tasks, known: Known
+) -> tuple[Tasks, int]:
     """Tasks that a run would compute, and the number of those with a result."""
     left = np.zeros(campaign.task_count, bool)
     left[tasks.rows] = True
     with Results(path) as results:
-        growth(path, results.campaign, campaign)
+        grown_by(path, results, campaign, part)
         rows, status = rows_in(campaign, results), results.status()
         done = (status == DONE) & left[rows]
         quantities = ("cpu_time", campaign.stop.quantity)

@@ -181,7 +181,7 @@ def test_a_part_is_what_it_is(tmp_path, capsys):
     more.write_text(campaign_text(realisations="3"))
     for campaign, words, sentence in (
         (path, ("--part", "1/3", "--out", out), "holds part 2/3 of it, and part 1/3 of it"),
-        (path, ("--out", out), "holds part 2/3 of it, and the whole campaign is wanted"),
+        (path, ("--dry-run", "--out", out), "part 2/3 of it, and the whole campaign is wanted"),
         (more, ("--part", "2/3", "--out", out), "a part does not grow"),
     ):
         assert main(["run", str(campaign), *map(str, words)]) == 2
