@@ -35,7 +35,7 @@ _STALLED = 1e3  # times that of a minimum: residual where the energy falls no mo
 _MOST_STEPS = 200_000
 _SLOWER, _FASTER = 2.0, 0.3  # times the damping 1/Δt after a step uphill, at least after others
 _AIM = 0.7  # of the longest way: that of the next step
-_LEAST_DAMPING, _MOST_DAMPING = 0.01, 1e8  # of the stiffness of the longest wave
+_LEAST_DAMPING, _MOST_DAMPING = 1e-6, 1e8  # of the stiffness of the longest wave
 
 
 @dataclass(frozen=True, eq=False)

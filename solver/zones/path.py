@@ -98,7 +98,7 @@ class Steps:
                     least = min(0.5 * abs(step), max(wanted, _NEAREST * self.scale))
                     step *= 0.5
                     continue
-                self._jump(here, after, (slope, slope_after), at_stake)
+                self._jump(here, after, (slope, slope_after), start, at_stake)
                 self.error += self.by_nodes * abs(self.jumps[-1].energy_drop)
                 if lost:
                     self.error += self._misplaced(here.separation, target)
@@ -155,11 +155,17 @@ class Steps:
         return abs(other.potential - after.potential) if moved else None
 
     def _jump(
-        self, here: Minimum, after: Minimum, slopes: tuple[float, float], at_stake: float | None
-    ) -> None:
-        """Append a jump that lies between two minima, at the prescribed value of the second."""
+        self, here: Minimum, after: Minimum, slopes: tuple[float, float], start: Array,
+        at_stake: float | None,
+    ) -> None:  # fmt: skip
+        """Append a jump that lies between two minima, at the prescribed value of the second.
+
+        The state before it is ``start``: a stiff machine would load ``here`` far more than it does
+        the branch. Under a load the energy is linear in that, at any gap.
+        """
         x = after.prescribed
-        last = self.descent.at(here.gap, x) if here.adhesion else replace(here, prescribed=x)
+        gap = here.gap if self.problem.control.is_load else np.maximum(start, 0.0)
+        last = self.descent.at(gap, x) if here.adhesion else replace(here, prescribed=x)
         before, end = self.state_of(last, slopes[0]), self.state_of(after, slopes[1])
         lost = self.problem.control.is_load and x > 0 and after.adhesion == 0
         if lost:

@@ -145,6 +145,14 @@ def test_audits_hold_under_a_machine_and_under_a_weight(control):
         assert jump.energy_drop > -0.01 * loop.loss
 
 
+def test_a_stiff_machine_loses_what_a_fixed_separation_does():
+    """It loads a contact that does not follow far more than one that does."""
+    turn = {"max_penetration": 0.5, "load_steps": 4}
+    controls = Control(1e12), Control()
+    stiff, fixed = (scenes.loop_of(problem_of(0.1, 0.5, one), "zones", **turn) for one in controls)
+    assert abs(stiff.loss - fixed.loss) < stiff.loss_error + fixed.loss_error
+
+
 def test_the_error_under_a_load_counts_where_contact_is_lost():
     """The separation varies as a square root of the load there: 0.8 % of the loss, 512 nodes."""
     weight, turn = problem_of(0.1, 0.05, Control(0.0)), {"max_stress": 100.0, "load_steps": 2}
