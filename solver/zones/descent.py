@@ -112,7 +112,7 @@ class Descent:
             if length < math.inf:
                 after = self.at(np.maximum(here.gap + way / max(1.0, length), 0.0), x)
                 fall = here.potential - after.potential
-                if abs(fall) < self.rounding * self.h_max:  # by the forces
+                if abs(fall) < self.rounding * self.h_max:  # by the forces at both ends
                     fall = -product(here.residual + after.residual, after.gap - here.gap)
                 downhill = fall > 0
             if not downhill:
@@ -149,9 +149,7 @@ class Descent:
         elastic = 0.5 * product(lifted, restoring) / surface.n
         potential = control.potential(elastic + adhesion, separation, p, self.h_max, 1.0)
         residual = (gradient + p) * free
-        return Minimum(
-            gap, x, separation, p, elastic, adhesion, potential, free, residual, ends
-        )  # fmt: skip
+        return Minimum(gap, x, separation, p, elastic, adhesion, potential, free, residual, ends)
 
     def rate(self, here: Minimum) -> tuple[Array, float]:
         """Compute dg/dx and dY/dx along the branch of a minimum, Y the conjugate of the control.
@@ -159,11 +157,11 @@ class Descent:
         To a millionth: of stiff solids the loss is a small difference of large works.
         """
         control, stiffness = self.control, self.surface.stiffness
-        start = here.free / here.free.mean()
         if control.is_fixed:
+            start = here.free / here.free.mean()
             out_of_balance = self._restrict(self._stiffen(start, here, stiffness), here)
         else:
-            start *= 0.0
+            start = np.zeros_like(here.free)
             out_of_balance = -here.free * (1.0 if control.is_load else control.stiffness)
         way, _ = self._solve(here, out_of_balance, _RATE, math.inf, stiffness)
         way += start

@@ -160,8 +160,8 @@ class Steps:
     ) -> None:  # fmt: skip
         """Append a jump that lies between two minima, at the prescribed value of the second.
 
-        The state before it is ``start``: a stiff machine would load ``here`` far more than it does
-        the branch. Under a load the energy is linear in that, at any gap.
+        The state before it is ``start``: a stiff machine would load the gap of ``here`` far more
+        than the branch. Under a load W of a gap is linear in the load, and that of ``here`` exact.
         """
         x = after.prescribed
         gap = here.gap if self.problem.control.is_load else np.maximum(start, 0.0)
